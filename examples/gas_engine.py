@@ -14,7 +14,6 @@ import ephs
 from ephs import Pattern, Reference, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.scene.build import initial_state, scene_system
 
 AREA = 2.0e-3  # m², of the piston
 HOT = 700.0  # K, of the gas above the piston
@@ -23,7 +22,7 @@ C = 2.5  # of a diatomic gas: its energy is 5/2 π v
 REFERENCE = Reference()
 
 scene = ephs.load(Path(__file__).parents[1] / "scenes" / "slider-crank.toml")
-engine = scene_system(scene, driven=["cylinder"])
+engine = scene.system(driven=["cylinder"])
 SLIDING, TURNING = "drives.cylinder", "drives.bearing"
 
 
@@ -66,10 +65,9 @@ gas_engine = cylinder(
     engine=engine,
     head=lib.heat_transfer(h=0.02),
     sump=lib.heat_transfer(h=0.02),
-    wall=lib.thermal_capacity(c1=REFERENCE.temperature * 100.0, c2=100.0),  # 100 J/K
+    wall=lib.thermal_capacity(capacity=100.0, temperature=REFERENCE.temperature),
 )
 START = {
-    **{f"engine.{path}": value for path, value in initial_state(scene).items()},
     "above.v": HEAD,
     "above.s": capacity * log(HOT / REFERENCE.temperature),
     "below.v": CRANKCASE,

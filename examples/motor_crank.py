@@ -12,12 +12,11 @@ import ephs
 from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.scene.build import initial_state, scene_system
 
 VOLTAGE, RESISTANCE, FLUX, GEAR, ROTOR = 12.0, 0.8, 0.08, 0.5, 2.0e-4  # V, Ω, Wb, crank per rotor, kg m²
 
 scene = ephs.load(Path(__file__).parents[1] / "scenes" / "slider-crank.toml")
-engine = scene_system(scene, driven=["bearing"])
+engine = scene.system(driven=["bearing"])
 SHAFT = "drives.bearing"  # the port of the bearing's momentum
 
 circuit = Pattern(
@@ -45,7 +44,7 @@ motor = circuit(
     field=lib.inductor(l=1.0),
     coupling=lib.mkc(),
     rotor=lib.rotor(j=ROTOR),
-    copper=lib.thermal_capacity(c1=293.15 * 40.0, c2=40.0),  # 40 J/K
+    copper=lib.thermal_capacity(capacity=40.0, temperature=293.15),
 )
 
 drive = Pattern(
@@ -61,7 +60,6 @@ motor_crank = drive(motor=motor, gear=gear, engine=engine)
 
 CRANK = float(scene.bodies["crank"].twist[1])  # rad/s at the start
 START = {
-    **{f"engine.{path}": value for path, value in initial_state(scene).items()},
     "motor.rotor.p": ROTOR * CRANK / GEAR,
     "motor.field.b": FLUX,
 }

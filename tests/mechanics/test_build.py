@@ -150,6 +150,19 @@ def test_states_of_any_mechanism_are_complete(scene):
 
 
 @settings(calm, max_examples=30)
+@given(mechanisms())
+def test_joints_of_systems_may_be_driven(scene):
+    """Each gets a port of its rate's momentum; the state at the start stays, and nothing else is a port."""
+    joints = {name: j for name, j in scene.all_joints() if j.dim}
+    system = scene.system(driven=joints)
+    ports = {path: len(range(j.dim)[part]) for j in joints.values() for path, part in drive_ports(j)}
+    assert {path: port.quantity.space.dim for path, port in system.interface.items()} == ports
+    assert all(np.array_equal(value, scene.system().initial[path]) for path, value in system.initial.items())
+    with pytest.raises(ephs.SceneError, match="expected a joint of the scene"):
+        scene.system(driven=["nowhere"])
+
+
+@settings(calm, max_examples=30)
 @given(mechanisms(loops=False))
 def test_mobility_of_trees_is_the_number_of_freedoms(scene):
     problem = problem_of_scene(scene)

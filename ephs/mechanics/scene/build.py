@@ -83,15 +83,22 @@ def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable
     return once(form, ("system", asked, pushed), made)
 
 
-def started_system(scene: Scene) -> System:
-    """The same with the scene's initial state, and ports where its loads and pressures act; made once, too."""
+def started_system(scene: Scene, *, driven: Iterable[str] = ()) -> System:
+    """The same with the scene's initial state, and ports where its loads and pressures act; made once, too.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such joint.
+    """
+    joints = frozenset(scene.joint(name).name for name in driven)
 
     def made() -> System:
         loaded = {load.body for _, load in scene.all_loads()}
         loaded |= {sheet.node(node) for _, sheet in scene.all_shells() for node in sheet.pushed()}
-        return scene_system(scene, wrenches=loaded).with_initial(initial_state(scene))
+        return scene_system(scene, driven=joints, wrenches=loaded).with_initial(initial_state(scene))
 
-    return once(scene, "started", made)
+    return once(scene, ("started", joints), made)
 
 
 def initial_state(scene: Scene) -> dict[Path, Array]:

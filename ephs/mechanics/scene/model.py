@@ -4,7 +4,7 @@ Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; twists are 6-vectors (angular,
 frame. All arrays are read-only. Nothing here knows of files; `load` makes these values from them.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar, final
 
@@ -96,16 +96,25 @@ class Scene:
     origin: Array = field(default_factory=lambda: IDENTITY_POSE)
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
-    def system(self) -> "System":
+    def system(self, *, driven: Iterable[str] = ()) -> "System":
         """The scene as a hierarchical exergetic port-Hamiltonian system, in the scene's initial state.
 
         Drives, loads, voltages and pressures are inputs at its outer ports: ``drives.JOINT``, ``voltages.MOTOR``,
         ``momenta.BODY`` of bodies with loads and of nodes of shells with a pressure. The system has no values for them;
         a run has to give them. Its reference environment is that of `ephs.Reference` unless a run is given another one.
+
+        Parameters
+        ----------
+        driven : names of joints that have a port ``drives.JOINT``, too, at which a larger system turns or moves them
+
+        Raises
+        ------
+        SceneError
+            The scene has no such joint.
         """
         from ephs.mechanics.scene.build import started_system
 
-        return started_system(self)
+        return started_system(self, driven=driven)
 
     def with_state(
         self,

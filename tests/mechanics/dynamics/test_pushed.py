@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.scene.build import initial_state, scene_system
 from tests.numerics import jacobian, largest
 from tests.written import scene_of_text
 
@@ -88,8 +87,7 @@ def test_derivatives_and_inverse_dynamics_are_those_of_accelerations(load, given
 
 
 def test_inputs_of_systems_are_numbers():
-    scene = scene_of_text(ARMS)
-    system = scene_system(scene, driven=["knee"]).with_initial(initial_state(scene))
+    system = scene_of_text(ARMS).system(driven=["knee"])
     model = ephs.dynamics(system, inputs={"drives.knee": {"flow": 0.5}})
     zero = np.zeros(model.layout.n)
     a = model.acceleration(model.state0, zero)
