@@ -230,7 +230,8 @@ def test_a_system_by_hand_takes_a_sampled_input(driven, method):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"period": 0.0}, "period"),
+        ({"period": 0.0}, "Sampled.period is 0.0"),
+        ({"period": float("nan")}, "Sampled.period is nan"),
         ({"period": 1e-15}, "at least"),
         ({"delay": -1.0}, "delay"),
         ({"limits": (1.0, -1.0)}, "limits"),

@@ -14,7 +14,7 @@ from ephs.mechanics.scene.state import resumed
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.systems.system import System
-from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.errors import OptionError, no_model
 from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
@@ -115,6 +115,8 @@ def _equilibrium(
         from ephs.mechanics.linear.settling import settled
 
         return Equilibrium(model, *settled(system_problem(model, initial, inputs, reference)))
+    if not isinstance(model, Scene):
+        raise no_model(model)
     for key, value in (("initial", initial), ("inputs", inputs), ("reference", reference)):
         if value is not None:
             raise OptionError(key, value, "none, of a scene: vary the scene instead")

@@ -153,7 +153,7 @@ def _is_large(problem: Problem) -> bool:
 
 
 def _closed(system: System, initial: Mapping[str, "ArrayLike"] | None) -> Problem:
-    ports = [port for port, t in system.interface.items() if t.power]
+    ports = [port for port, t in system.interface.items() if t.power] if isinstance(system, System) else []
     inputs = {str(port): {"flow": np.zeros(system.interface[port].quantity.space.dim)} for port in ports}
     return problem_of_system(system, initial, inputs)
 

@@ -7,6 +7,7 @@ from ephs.mechanics.rewrite.steps import Reduction, Step, listed
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.systems.system import System
+from ephs.solve.posing.errors import no_model
 from ephs.solve.running.threads import in_one_thread
 
 
@@ -25,8 +26,10 @@ def reduce(model: System | Scene) -> Reduction:
     if isinstance(model, Scene):
         problem = problem_of_scene(model)
         system, name = problem.system, model.name
-    else:
+    elif isinstance(model, System):
         problem, system, name = None, model, "system"
+    else:
+        raise no_model(model)
     # an outer port whose effort is prescribed has a flow for an unknown, here and in all that follow
     held = sum(system.interface[port].quantity.space.dim for port in problem.prescribed) if problem else 0
     before = _unknowns(system) + held

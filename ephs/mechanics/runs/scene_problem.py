@@ -28,7 +28,7 @@ from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.systems.kept import once
-from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.errors import OptionError, no_model
 from ephs.solve.posing.problem import Problem
 
 if TYPE_CHECKING:
@@ -63,6 +63,8 @@ def problem_of_scene(
     scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
 ) -> Problem:
     """The initial value problem of a scene."""
+    if not isinstance(scene, Scene):
+        raise no_model(scene)
     view = view_of(scene)
     forces, wrenches, others = scene_signals(scene, inputs or {}, view)
     system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))

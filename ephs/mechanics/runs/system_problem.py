@@ -12,6 +12,7 @@ from ephs.semantics.bundles import extents
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.systems.system import System
+from ephs.solve.posing.errors import OptionError, no_model
 from ephs.solve.posing.problem import Problem, Signal
 
 if TYPE_CHECKING:
@@ -34,6 +35,10 @@ def problem_of_system(
     """
     if isinstance(system, Pattern):
         raise AssemblyError("unfilled", "model")
+    if not isinstance(system, System):
+        raise no_model(system)
+    if not isinstance(reference, Reference | None):
+        raise OptionError("reference", reference, "ephs.Reference(temperature=…, pressure=…)")
     descriptor = system.descriptor()
     signals: dict[Path, Signal] = {}
     for port, given in (inputs or {}).items():

@@ -25,6 +25,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.systems.system import Filling, System
+from ephs.solve.posing.errors import no_model
 
 Model = TypeVar("Model", bound=Scene | System)
 _INDEX = re.compile(r"((?:\[\d+\])*)$")
@@ -42,6 +43,8 @@ def read(model: Scene | System, path: str) -> float:
     """
     if isinstance(model, System):
         return _component(model, path)[2]
+    if not isinstance(model, Scene):
+        raise no_model(model)
     return _ParameterTarget.of(model, path).read(model)
 
 

@@ -14,7 +14,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, NEIGHBOUR, TINY
 from ephs.semantics.systems.system import System
-from ephs.solve.posing.errors import OptionError, nearest_of
+from ephs.solve.posing.errors import OptionError, nearest_of, no_model
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.threads import in_one_thread
 
@@ -119,6 +119,8 @@ def fit(
     for path, (least, most) in (bounds or {}).items():
         if not least < most:
             raise OptionError(f"bounds[{path!r}]", (least, most), "(least, most), the first below the second")
+    if not isinstance(model, Scene | System):
+        raise no_model(model)
     record = _RecordedVector(model, data, sigma or {})
     guess = {
         path: float((start or {})[path]) if path in (start or {}) else _own(model, path, run) for path in parameters

@@ -154,6 +154,11 @@ class OptionError(ValueError):
         return (OptionError, (self.key, self.found, self.expected))
 
 
+def no_model(found: object) -> OptionError:
+    """Refusal of what is neither a scene nor a system."""
+    return OptionError("model", found, "a Scene, as ephs.load makes it of a file, or a System")
+
+
 def number_of(key: str, given: object, expected: str = "a number of seconds") -> float:
     """The number of the option ``key``; texts and truth values are none.
 

@@ -66,10 +66,10 @@ class Sampled:
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise OptionError("Sampled.function", self.function, "a function f(t, state)")
-        number_of("Sampled.period", self.period, "a number of seconds > 0")
-        delay = number_of("Sampled.delay", self.delay, "a number of seconds >= 0")
-        if not (np.isfinite(delay) and delay >= 0.0):
-            raise OptionError("Sampled.delay", self.delay, "a number of seconds >= 0")
+        for key, bound, least in (("period", ">", np.finfo(float).tiny), ("delay", ">=", 0.0)):
+            given, expected = getattr(self, key), f"a number of seconds {bound} 0"
+            if not least <= number_of(f"Sampled.{key}", given, expected) < np.inf:
+                raise OptionError(f"Sampled.{key}", given, expected)
         if self.limits is not None and not np.all(np.asarray(self.limits[0]) <= np.asarray(self.limits[1])):
             raise OptionError("Sampled.limits", self.limits, "(lower, upper), lower <= upper")
         for name, size in self.noise.items():
