@@ -8,11 +8,12 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from functools import partial
-from types import CodeType, FunctionType, MethodType
+from types import FunctionType, MethodType
 from typing import Any, Final
 
 import numpy as np
 
+from ephs.semantics.derive.recording import codes_of, values_read
 from ephs.semantics.stage.known import PACKAGE, code_digest
 
 _WRITES: Final = ("STORE_DEREF", "STORE_GLOBAL", "DELETE_DEREF", "DELETE_GLOBAL")
@@ -61,35 +62,15 @@ def _told(value: object, seen: set[int]) -> Iterator[str]:
 
 def _of_function(function: FunctionType, seen: set[int]) -> Iterator[str]:
     """Its code and defaults, and what it closes over; of globals, functions of its own module and plain values."""
-    codes = list(_codes(function.__code__))
-    instructions = [each for code in codes for each in dis.get_instructions(code)]
+    instructions = [each for code in codes_of(function.__code__) for each in dis.get_instructions(code)]
     written = {each.argval for each in instructions if each.opname in _WRITES}
     changes = any(each.opname == "STORE_SUBSCR" for each in instructions)
+    module, closed = function.__module__, function.__code__.co_freevars
+    ours = module.partition(".")[0] == PACKAGE  # whose version is told
     yield code_digest(function.__code__)
-    read: dict[str, Any] = {}
-    if function.__module__.partition(".")[0] != PACKAGE:  # whose version is told
-        names = [name for code in codes for name in code.co_names if name in function.__globals__]
-        read = {name: function.__globals__[name] for name in names}
-        read = {name: found for name, found in read.items() if _own(found, function.__module__)}
-    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-        try:
-            read[name] = cell.cell_contents
-        except ValueError:  # it is written later
-            continue
-    for name, found in sorted(read.items()):
-        if name not in written and not (changes and isinstance(found, np.ndarray)):
+    for name, found in sorted(values_read(function).items()):
+        own = name in closed or not (ours or (isinstance(found, FunctionType | type) and found.__module__ != module))
+        if own and name not in written and not (changes and isinstance(found, np.ndarray)):
             yield name
             yield from _told(found, seen)
     yield from _told((function.__defaults__, *sorted((function.__kwdefaults__ or {}).items())), seen)
-
-
-def _own(value: object, module: str) -> bool:
-    return not isinstance(value, FunctionType | type) or value.__module__ == module
-
-
-def _codes(code: CodeType) -> Iterator[CodeType]:
-    """A code and all that is written inside it."""
-    yield code
-    for part in code.co_consts:
-        if isinstance(part, CodeType):
-            yield from _codes(part)

@@ -5,7 +5,7 @@ What branches on its arguments, or turns them into floats, cannot be recorded; t
 
 import math
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, final
@@ -269,6 +269,22 @@ def _replaced(value: Any, depth: int) -> Any:
     if isinstance(value, types.BuiltinFunctionType):
         return _BY_IDENTITY.get(id(value), value)
     return _recordable(value, depth + 1) if isinstance(value, types.FunctionType) else value
+
+
+def codes_of(code: types.CodeType) -> Iterator[types.CodeType]:
+    """A code, and those of the functions that are written inside it."""
+    yield code
+    for part in code.co_consts:
+        if isinstance(part, types.CodeType):
+            yield from codes_of(part)
+
+
+def values_read(function: types.FunctionType) -> dict[str, Any]:
+    """By name, the globals that a function names, and the variables that it closes over, as far as they exist."""
+    names = {name: None for code in codes_of(function.__code__) for name in code.co_names}
+    found = {name: function.__globals__[name] for name in names if name in function.__globals__}
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    return found | {name: cell.cell_contents for name, cell in cells if filled(cell)}
 
 
 def filled(cell: types.CellType) -> bool:

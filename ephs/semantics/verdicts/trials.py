@@ -15,7 +15,7 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.derive.recording import filled
+from ephs.semantics.derive.recording import values_read
 from ephs.semantics.primitives.forms import tape_of
 from ephs.semantics.spaces import SO3, codes, manifold
 
@@ -209,10 +209,13 @@ def _written(value: object, seen: set[int]) -> list[float]:
         case CodeType():
             parts = list(value.co_consts)
         case FunctionType():
-            used = [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
-            cells = [cell.cell_contents for cell in value.__closure__ or () if filled(cell)]
-            parts = [value.__code__, *cells, *(value.__defaults__ or ()), *(value.__kwdefaults__ or {}).values()]
-            parts += [each for each in used if isinstance(each, int | float | FunctionType)]
+            parts = [value.__code__, *(value.__defaults__ or ()), *(value.__kwdefaults__ or {}).values()]
+            closed = value.__code__.co_freevars
+            parts += [
+                each
+                for name, each in values_read(value).items()
+                if name in closed or isinstance(each, int | float | FunctionType)
+            ]
         case _:
             pass
     return [number for part in parts for number in _written(part, seen)]
