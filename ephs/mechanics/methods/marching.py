@@ -7,6 +7,7 @@ import numpy as np
 
 from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.rounding import LOOKED, warn_of_rounding
 from ephs.mechanics.methods.stages import KeptJacobian
 from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import ReducedState
@@ -76,7 +77,7 @@ class March:
         self.own, eq.accounts.kept = eq.accounts.own, True
         summed = start.account.size - self.own
         self.method, self.span, self.left, self._leave = method, span, False, left
-        self._handed, self._kept = 0, kept
+        self._handed, self._kept, self._look = 0, kept, float(LOOKED)
         self._contest, self._lagged = contest, lagged is not None
         self._weighed = np.zeros(3)  # where the window began: tries, cost in evaluations, time
         size, q, times = eq.size, span.state.q, span.save_at
@@ -142,6 +143,8 @@ class March:
         if self._kept is not None:
             self._kept.count()
         self._hold(sound)
+        if self.explicit and c.steps >= self._look and not c.grid:
+            self._look *= LARGEST if warn_of_rounding(self.method, self.state, c) else 2
         self.method.stiffness = float(c.stiff)
         if found == Ending.CAREFUL or (self._kept is not None and found >= Ending.REFUSED):
             self._step()
