@@ -203,6 +203,21 @@ def test_a_state_at_a_kink_has_no_linear_system(power, place):
             ephs.linearize(system, {"spring.q": place})
 
 
+@pytest.mark.parametrize("beside", [0.0, 1e-9, 1e-3, 0.1, 1.0, 5.0, -1.0, 100.0])
+@pytest.mark.parametrize("entropy", [0.0, 1e-3, 0.05, -0.05])
+def test_a_temperature_near_that_of_the_environment_is_no_kink(beside, entropy):
+    """What rounds is the temperature, not the effort: with ṡ₁ = h (θ₂ − θ₁)/θ₁, ∂ṡ₁/∂s₁ = −h θ₂/(c θ₁)."""
+    c, h, other = 12.9, 0.3, 300.0
+    system = Pattern.from_text("s: entropy; z: entropy; one(s); two(s=z); wall(s1=s, s2=z)")(
+        one=lib.thermal_capacity(capacity=c, temperature=293.15 + beside),
+        two=lib.thermal_capacity(capacity=3.0, temperature=other), wall=lib.heat_transfer(h=h),
+    )  # fmt: skip
+    own = (293.15 + beside) * np.exp(entropy / c)
+    found = ephs.linearize(system, {"one.s": entropy}).A
+    exact = [[-h * other / (c * own), h * other / (3.0 * own)], [h * own / (c * other), -h * own / (3.0 * other)]]
+    np.testing.assert_allclose(found, exact, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("energy", "at", "stiffness"),
     [
