@@ -306,6 +306,44 @@ def test_entropies_of_radau_are_sums_of_what_is_made(rtol):
     assert np.diff(ledgers.entropy).min() >= -rounding
 
 
+GAS = lib.ideal_gas(c1=300.0, c2=2.0, v0=1.0, c=1.5)
+UNMOVED = {
+    "rubbed": (
+        "s: entropy; v: volume; p: momentum, exposed; gas(s, v); rub(p, s)",
+        {"gas": GAS, "rub": lib.friction(d=200.0)}, {"gas.v": 1.0}, {"p": {"effort": 1.0}},
+    ),
+    "fed with heat": (
+        "s: entropy, exposed; v: volume; gas(s, v)", {"gas": GAS}, {"gas.v": 1.0}, {"s": {"flow": np.sin}}
+    ),
+    "fed with heat, beside an oscillator": (
+        "s: entropy, exposed; hot(s); q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)",
+        {"hot": lib.thermal_capacity(capacity=5.0, temperature=300.0), "pe": lib.spring(k=1.0), "pkc": lib.pkc(),
+         "ke": lib.point_mass(m=1.0)}, {"pe.q": 1.0}, {"s": {"flow": np.sin}},
+    ),
+    "two gases": (
+        "s: entropy; v: volume; z: entropy; w: volume; gas(s, v); other(s=z, v=w); wall(s1=s, s2=z)",
+        {"gas": GAS, "other": GAS, "wall": lib.heat_transfer(h=0.5)}, {"gas.v": 1.0, "other.v": 0.5}, None,
+    ),
+}  # fmt: skip
+"""Systems in which entropy alone moves, or a part of them, so that no state can take up what a step misses."""
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6])
+@pytest.mark.parametrize("name", UNMOVED)
+def test_what_no_state_can_take_up_is_allowed_as_the_error_that_it_is(name, rtol):
+    text, parts, start, inputs = UNMOVED[name]
+    options = {"initial": start, "inputs": inputs, "method": "radau", "save_at": np.linspace(0.0, 3.0, 61)}
+    system = ephs.Pattern.from_text(text)(**parts)
+    sol = ephs.simulate(system, 3.0, rtol=rtol, atol=1e-3 * rtol, **options)
+    assert LAWFUL < sol.energy_error.max() < 10.0 * rtol
+    defect = sol.stats["plain_defect"]
+    assert defect["left"] == pytest.approx(sol.energy_error.max() * sol.ledgers.scale, rel=0.1)
+    kept = altered(sol, stats=sol.stats | {"plain_defect": defect | {"left": 0.0}})
+    assert [one.law for one in audit(kept, Bounds(rtol)).findings] == ["energy"], "the control"
+    worse = bent(sol, work=kick(sol.work, 3.0 * defect["left"]))
+    assert [one.law for one in audit(worse, Bounds(rtol)).findings] == ["energy"], "another"
+
+
 RESTING = """
 format = 1
 [bodies.mass]

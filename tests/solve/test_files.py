@@ -17,6 +17,7 @@ from ephs.solve.result import file, guard
 from ephs.solve.result.labels import freedoms, labels_of
 from ephs.testing import mechanisms, systems
 from tests.numerics import largest
+from tests.oscillator import free_oscillator
 from tests.scenes import shipped
 from tests.written import scene_of_text
 
@@ -286,6 +287,22 @@ def test_other_formats_are_refused(tmp_path, found):
     data.to_netcdf(tmp_path / "sol.nc", engine="h5netcdf")
     with pytest.raises(ValueError, match=rf"sol\.nc: ephs_format is {found}, expected one of 2, 3, 4"):
         ephs.load_solution(tmp_path / "sol.nc")
+
+
+PLAIN = ephs.simulate(free_oscillator(), 0.1, initial={"pe.q": 1.0}, step=0.1)
+
+
+@pytest.mark.parametrize("kind", [str(name) for name in PLAIN.to_xarray().variables if ":" not in str(name)])
+def test_a_quantity_may_have_the_name_of_an_array(kind, tmp_path):
+    """An axis of an input is named after its quantity, as of entropy; ledgers and the time have names, too."""
+    of = ephs.Quantity(kind, ephs.Space("real", 1, 1), 1)
+    fed = ephs.Pattern(junctions={"x": ephs.junction(of, exposed=True)}, boxes={"store": {"x": "x"}})(
+        store=ephs.storage({"x": of}, lambda x: np.exp(x))
+    )
+    sol = ephs.simulate(fed, 0.2, step=0.1, inputs={"x": {"flow": np.cos}})
+    again = through_a_file(sol, tmp_path)
+    assert np.array_equal(again.port("x").power, sol.port("x").power) and np.array_equal(again.heat, sol.heat)
+    assert again.to_xarray()["input:x"].values.tobytes() == sol.inputs[ephs.Path.of("x")].values.tobytes()
 
 
 @given(systems())

@@ -6,6 +6,7 @@ import pytest
 import ephs
 from ephs import Pattern, junction, quantity
 from ephs import library as lib
+from ephs.solve.methods import radau
 from ephs.solve.result import ports
 from tests.written import scene_of_text
 
@@ -50,6 +51,21 @@ def test_a_led_current_has_its_linkage_heat_and_voltage_whatever_its_frequency(o
     voltage = 2.0 * omega * np.cos(omega * t) + np.sin(omega * t)
     assert np.allclose(here.flow[:, 0], voltage, atol=ports.DOUBTED * np.abs(voltage).max())
     assert np.allclose(here.power, voltage * np.sin(omega * t), atol=ports.DOUBTED * np.abs(voltage).max())
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("inductance", [1e-3, 2.0, 1e3])
+def test_a_short_run_has_its_work_whatever_is_stored(inductance, rtol, monkeypatch):
+    """Its voltage is a difference of linkages, which a step of a microsecond has to few digits."""
+    sol = led(lib.inductor(l=inductance), lambda t: np.cos(3.0 * t), 1e-3, rtol=rtol, initial={"coil.b": inductance})
+    heat = 0.5 * (sol.t + np.sin(6.0 * sol.t) / 6.0)
+    stored = -0.5 * inductance * np.sin(3.0 * sol.t) ** 2
+    rounded = len(sol) * radau.ROUNDING * inductance
+    assert np.allclose(sol.work, heat + stored, rtol=0.0, atol=10.0 * (rtol * np.abs(sol.work).max() + rounded))
+    if inductance == 1e3:
+        monkeypatch.setattr(radau, "ROUNDING", 0.0)
+        with pytest.raises(ephs.SimulationError, match="below the smallest"):
+            led(lib.inductor(l=inductance), np.cos, 1e-3, rtol=1e-12, initial={"coil.b": inductance})
 
 
 def voltage_error(knee):

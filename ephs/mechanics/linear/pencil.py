@@ -199,8 +199,10 @@ class Pencil:
             A state is at a kink or a jump of an energy or a flow.
         """
         matrices, here = self.equations.matrices(x, z, self._given), self.equations.residual(x, z, self._given)
-        states, terms = matrices.states.toarray()[:, : self.n_w], np.abs(matrices.unknowns) @ np.abs(z)
-        d = self.problem.descriptor
+        states, sizes, d = matrices.states.toarray()[:, : self.n_w], np.abs(z), self.problem.descriptor
+        # what rounds are temperatures and pressures, not their differences from the environment's
+        sizes[self.n_w : self.n_w + self.n_e] += np.abs(self.model.tables.intensive)
+        terms = np.abs(matrices.unknowns) @ sizes
 
         def off(slot: StateSlot, w: Array, step: float, size: float) -> Array:
             """Error of each equation's difference quotient, 0 where it is rounding."""

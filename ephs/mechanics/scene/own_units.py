@@ -195,8 +195,8 @@ def _stats(stats: Mapping[str, Any], units: OwnUnits, factors: Mapping[Path, Arr
         if out.get(key) is not None:
             out[key] *= unit
     if "plain_defect" in out:
-        factor = {"sum": units.energy, "largest": units.energy, "at": units.time}
-        out["plain_defect"] = {key: value * factor[key] for key, value in out["plain_defect"].items()}
+        defect = out["plain_defect"].items()
+        out["plain_defect"] = {key: value * (units.time if key == "at" else units.energy) for key, value in defect}
     if "jumps" in out:
         found = [{**one, "t": one["t"] * units.time} for one in out["jumps"]["found"]]
         out["jumps"] = {**out["jumps"], "found": found}

@@ -17,10 +17,9 @@ from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.bundles.extents import room
 from ephs.semantics.derive.relations import compiled
 from ephs.semantics.primitives.behaviour import NaturalBehaviour, Storing
-from ephs.semantics.primitives.differences import settled
+from ephs.semantics.primitives.differences import slope
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
-from ephs.semantics.spaces.rank import DIFFERENCE
 from ephs.semantics.stage import Signature
 from ephs.semantics.stage.reaching import Atom
 
@@ -129,7 +128,7 @@ _Evaluate = Callable[[Array, dict[Any, Array], list[int], list[Array]], None]
 
 def _storage(storage: Storage, potentials: Mapping[str, float]) -> _Evaluate:
     def evaluate(scal: Array, point: dict[Any, Array], _dims: list[int], views: list[Array]) -> None:
-        v, effort, _, slope, energy, _ = views
+        v, effort, _, hessian, energy, _ = views
         reference = Reference(float(scal[1]), float(scal[2]), potentials)
 
         def outputs_at(step: Array) -> Array:
@@ -137,9 +136,7 @@ def _storage(storage: Storage, potentials: Mapping[str, float]) -> _Evaluate:
 
         step = v.copy()
         effort[:] = outputs_at(step)
-        ways = zip(_rooms(storage, point), np.eye(step.size), strict=True)
-        columns = [settled(lambda k, way=way: outputs_at(step + k * way), size) for size, way in ways]
-        slope[:] = np.array(columns).T.ravel()
+        hessian[:] = slope(outputs_at, step, _rooms(storage, point)).ravel()
         energy[0] = storage.energy(storage.retract(point, step))
 
     return evaluate
@@ -165,8 +162,8 @@ def _relation(primitive: Primitive, potentials: Mapping[str, float]) -> _Evaluat
         z = np.concatenate([e, lam, v])
         out = outputs_at(z)
         flow[:], condition[:] = out[:n], out[n:]
-        sizes = DIFFERENCE * np.concatenate([np.ones(n + k), _rooms(primitive, point)])
-        jacobian[:] = _differenced(outputs_at, z, sizes).ravel()
+        rooms = np.concatenate([np.maximum(1.0, np.abs(z[: n + k])), _rooms(primitive, point)])
+        jacobian[:] = slope(outputs_at, z, rooms).ravel()
 
     return evaluate
 
@@ -176,12 +173,3 @@ def _rooms(primitive: Primitive, point: Mapping[Any, Array]) -> Array:
     of = [primitive.interface[port].quantity for port in primitive.reads]
     rooms = [np.full(each.space.dim, room(each, point[port])) for each, port in zip(of, primitive.reads, strict=True)]
     return np.concatenate([*rooms, np.zeros(0)])
-
-
-def _differenced(function: Callable[[Array], Array], z: Array, sizes: Array) -> Array:
-    columns: list[Array] = []
-    for i in range(z.size):
-        delta = np.zeros(z.size)
-        delta[i] = sizes[i] * max(1.0, abs(float(z[i])))
-        columns.append((function(z + delta) - function(z - delta)) / (2.0 * delta[i]))
-    return np.array(columns).T if columns else np.zeros((0, 0))

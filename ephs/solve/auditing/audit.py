@@ -121,16 +121,22 @@ def _nothing() -> float:
     return 0.0
 
 
-def _energy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
-    """The balance of kinetic + potential + heat − work, and of all energies − work."""
-    ledgers = solution.ledgers
+def _energy(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
+    """The balance of kinetic + potential + heat − work, and of all energies − work.
+
+    What corrected steps leave, as they can move nothing by it, is an error: it is allowed that of the method.
+    """
+    ledgers, left = solution.ledgers, solution.stats.get("plain_defect", {}).get("left", 0.0)
     worst = worst_entry(solution.energy_error)
     # destroyed exergy counts as energy; the environment's is its inflow
     destroyed = {path: ledgers.temperature * made for path, made in ledgers.makers.items()}
     parts = {path: energy for path, energy in ledgers.storages.items() if ledgers.exergies[path].any()} | destroyed
     jump = 1 + int(np.argmax(np.abs(np.diff(solution.energy_error)))) if len(solution) > 1 else 0
     busiest = max(parts, key=lambda path: _step(parts[path], jump), default=None)
-    yield Breach(float(solution.energy_error[worst]), lambda: rounded(solution) / ledgers.scale, worst, busiest)
+    allowed = min(left / ledgers.scale, bounds.accuracy)
+    yield Breach(
+        float(solution.energy_error[worst]), lambda: rounded(solution) / ledgers.scale + allowed, worst, busiest
+    )
 
 
 def _step(values: Array, instant: int) -> float:
@@ -296,7 +302,8 @@ LAWS: Mapping[str, AuditLaw] = {
     "energy": AuditLaw(
         "energy changes by heat and work only",
         "largest K + |V − V₀| + |heat| + |work|",
-        f"{LAWFUL:g} where a method's steps are lawful; else {MANY_TIMES:g} rtol (atol where that is 0), "
+        f"{LAWFUL:g} where a method's steps are lawful, or corrected, but for what corrections can move nothing by; "
+        f"else {MANY_TIMES:g} rtol (atol where that is 0), "
         f"at least {LEAST:g}; {COARSE:g} at constant steps",
         _energy,
         lambda bounds: bounds.energy,

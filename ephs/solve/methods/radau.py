@@ -21,7 +21,7 @@ from ephs.solve.methods.energies import EnergyEquations
 from ephs.solve.methods.kept import KeptMatrices
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
-from ephs.solve.methods.settling import PUT, TOTAL, Settling
+from ephs.solve.methods.settling import LEFT, PUT, TOTAL, Settling
 from ephs.solve.methods.solvers import Solvers
 from ephs.solve.methods.stores import HeatStores
 from ephs.solve.posing.errors import LARGEST, Outcome, SolveError, worst_entry
@@ -200,8 +200,8 @@ class Radau:
 
     def record(self, taken: Instants[RadauState]) -> RunRecord:
         """Records of many instants."""
-        noted = [(state.t, *state.account[PUT : TOTAL + 1]) for _, state, _ in taken if state.account.size]
-        times, *put = np.array(noted).reshape(-1, 3).T
+        noted = [(state.t, *state.account[[PUT, TOTAL, LEFT]]) for _, state, _ in taken if state.account.size]
+        times, *put = np.array(noted).reshape(-1, 4).T
         self._settling.noted.note(times, np.stack(put, axis=1))
         return record_of(taken, [self.row(state) for _, state, _ in taken])
 
@@ -348,12 +348,15 @@ class Radau:
     def _supplied_error(self, state: RadauState, end: RadauState, h: float, powers: Array) -> float:
         """The same of heat, supply and entropy, relative to them or to what a step passes.
 
-        Of states that are led nothing else is an error: they are as they must be, however long the step.
+        Of states that are led nothing else is an error: they are as they must be, however long the step. Their flows
+        are differences of amounts over this step, or the one before: rounding of the energies is none, either.
         """
-        raw = h * (self.scheme.gamma * self._known(state).sums[:4] + self.scheme.defect @ powers)
-        return _size(
-            raw, self._tolerance * np.maximum(np.abs(end.sums[:4]), abs(h) * np.abs(powers).max(axis=0)) + TINY
-        )
+        known = self._known(state)
+        raw = h * (self.scheme.gamma * known.sums[:4] + self.scheme.defect @ powers)
+        rounding = ROUNDING * (1.0 + abs(h / state.h)) * np.abs(np.delete(known.energies, self.stores.components)).sum()
+        passed = np.maximum(np.abs(end.sums[:4]), abs(h) * np.abs(powers).max(axis=0))
+        units = np.array([1.0, 1.0, 1.0, 1.0 / self.model.reference.temperature])
+        return _size(raw, self._tolerance * passed + rounding * units + TINY)
 
     def _filtered(self, h: float, changes: Array) -> Array:
         """Changes (…, states) with their stiff parts damped, so that what is algebraic allows them."""

@@ -119,7 +119,7 @@ class Settling:
     Attributes
     ----------
     active
-        Whether there is a state that may be moved.
+        Whether there are such storages; where none of their states may be moved, what they miss is left.
     noted
         What was moved in states that are kept.
     """
@@ -135,7 +135,7 @@ class Settling:
                 self._free[state.point] = float(state.quantity.kind != "entropy")
                 environment = isinstance(slot.primitive, Storage) and slot.primitive.environment
                 weights[state.point] = model.reference.intensive(state.quantity) if environment else 0.0
-        self.active = bool(self._free.any())
+        self.active = bool(counted.size)
         tables = replace(model.only(counted).tables, address=model.resting(counted)[counted])
         self._account = RunAccount.table(1)
         self._states, self._start, self._along, self._beside, trial, self._allowed = np.zeros((6, d.point_size))

@@ -39,6 +39,12 @@ _LEDGERS = {
     "momenta": ("N s", "momentum"),
     "exergies": ("J", "exergy"),
 }
+_OF_ALL = {
+    "energy": ("J", "energy of everything"),
+    "energy_error": ("1", "relative defect of the energy balance"),
+    "constraint_error": ("m, rad", "largest position residual of a joint"),
+    "velocity_error": ("m/s, rad/s", "largest velocity residual of a joint"),
+}
 
 
 @final
@@ -81,8 +87,10 @@ class DatasetVariable:
 
     @classmethod
     def of(cls, values: Array, labels: Labels, says: str) -> "DatasetVariable":
-        """Variable of a state's values."""
-        axes = ((labels.dimension, labels.names),) if values.ndim > 1 else ()
+        """Variable of a state's values; no axis has the name of an array, as that of entropies would."""
+        name = labels.dimension
+        name += " 1" * (name in {"t", *_LEDGERS, *_OF_ALL})
+        axes = ((name, labels.names),) if values.ndim > 1 else ()
         return cls(values, labels.unit, says, axes)
 
 
@@ -140,16 +148,8 @@ def _variables(solution: "Solution") -> Iterable[tuple[str, DatasetVariable]]:
         group, _, path = name.partition(":")
         units, says = _LEDGERS[group]
         yield name, DatasetVariable(values, units, f"{says} of {path}" if path else says)
-    yield "energy", DatasetVariable(solution.energy, "J", "energy of everything")
-    yield "energy_error", DatasetVariable(solution.energy_error, "1", "relative defect of the energy balance")
-    yield (
-        "constraint_error",
-        DatasetVariable(solution.constraint_error, "m, rad", "largest position residual of a joint"),
-    )
-    yield (
-        "velocity_error",
-        DatasetVariable(solution.velocity_error, "m/s, rad/s", "largest velocity residual of a joint"),
-    )
+    for name, (units, says) in _OF_ALL.items():
+        yield name, DatasetVariable(getattr(solution, name), units, says)
     yield from ((f"input:{path}", variable) for path, variable in solution.inputs.items())
 
 

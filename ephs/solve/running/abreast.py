@@ -161,8 +161,9 @@ def _names(values: Sequence[str]) -> str:
 
 
 def _defects(values: Sequence[dict[str, float]]) -> dict[str, float]:
-    """By how much balances would be missed: the sum of all, and the largest with its time."""
-    return {**max(values, key=lambda one: one["largest"]), "sum": sum(one["sum"] for one in values)}
+    """By how much balances would be missed: sums of all, and the largest with its time."""
+    sums = {key: sum(one[key] for one in values) for key in ("sum", "left")}
+    return {**max(values, key=lambda one: one["largest"]), **sums}
 
 
 _COMBINED: Final[dict[str, Callable[[Sequence[Any]], Any]]] = {

@@ -203,6 +203,39 @@ def test_a_state_at_a_kink_has_no_linear_system(power, place):
             ephs.linearize(system, {"spring.q": place})
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-5, 1e-6])
+def test_a_constraint_that_cannot_be_recorded_is_differenced_over_its_own_length(size):
+    """Two masses on a curve of waves: of a micrometre, which are shorter than any difference, they are wrong."""
+
+    def linear(place):
+        waves = ephs.constraint(
+            {"a": quantity.momentum, "b": quantity.momentum, "~q": quantity.displacement},
+            lambda q: [[1.0 + 0.3 * np.sin(place(q) / size), 1.0]], multipliers=1,
+        )  # fmt: skip
+        system = Pattern.from_text(
+            "q: displacement; a: momentum; b: momentum; pe(q); pkc(q, p=a); m(p=a); n(p=b); w(a, b, ~q)"
+        )(pe=lib.spring(k=1.0), pkc=lib.pkc(), m=lib.point_mass(m=1.0), n=lib.point_mass(m=1.0), w=waves)
+        return ephs.linearize(system, {"pe.q": 0.3 * size, "m.p": 1.0, "n.p": -1.0 - 0.3 * np.sin(0.3)}).A
+
+    exact = linear(lambda q: q)
+    assert (largest(linear(float) - exact) <= 1e-6 * largest(exact)) == (size > 1e-6)
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-9, 1e-3, 0.1, 1.0, 5.0, -1.0, 100.0])
+@pytest.mark.parametrize("entropy", [0.0, 1e-3, 0.05, -0.05])
+def test_a_temperature_near_that_of_the_environment_is_no_kink(beside, entropy):
+    """What rounds is the temperature, not the effort: with ṡ₁ = h (θ₂ − θ₁)/θ₁, ∂ṡ₁/∂s₁ = −h θ₂/(c θ₁)."""
+    c, h, other = 12.9, 0.3, 300.0
+    system = Pattern.from_text("s: entropy; z: entropy; one(s); two(s=z); wall(s1=s, s2=z)")(
+        one=lib.thermal_capacity(capacity=c, temperature=293.15 + beside),
+        two=lib.thermal_capacity(capacity=3.0, temperature=other), wall=lib.heat_transfer(h=h),
+    )  # fmt: skip
+    own = (293.15 + beside) * np.exp(entropy / c)
+    found = ephs.linearize(system, {"one.s": entropy}).A
+    exact = [[-h * other / (c * own), h * other / (3.0 * own)], [h * own / (c * other), -h * own / (3.0 * other)]]
+    np.testing.assert_allclose(found, exact, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("energy", "at", "stiffness"),
     [
