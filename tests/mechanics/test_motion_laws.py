@@ -371,9 +371,14 @@ def test_a_run_starts_where_its_joints_move_as_their_laws_say(method):
     scene, law = scene_of_text(SWINGER), lambda t: 0.3 * np.sin(4.0 * np.pi * t)
     with pytest.raises(ephs.OptionError, match=r"joints\.pin has the rate 3\.76991 .* scene\.at\(solution, 0\.3\)"):
         ephs.simulate(scene, 0.5, t0=0.3, method=method, step=1e-2)
-    there = scene.at(ephs.simulate(scene, 0.3, method="rk87", rtol=1e-10), 0.3)
-    for start, t0 in ((scene, 0.5), (there, 0.3)):
-        sol = ephs.simulate(start, t0 + 0.1, t0=t0, method=method, step=1e-2)
+    run = ephs.simulate(scene, 0.3, method="rk87", rtol=1e-10)
+    arrived = {str(path): values[-1] for path, values in run.states.items()}
+    for start, t0, initial in ((scene, 0.5, None), (run.scene.at(run, 0.3), 0.3, None), (scene, 0.3, arrived)):
+        sol = ephs.simulate(start, t0 + 0.1, t0=t0, method=method, step=1e-2, initial=initial)
         off = np.abs(sol.joint("pin").coordinate[:, 0] - law(sol.t)).max()
         # natural sums rates in the middle of steps: h²/24 of what accelerations change by
         assert off < (1e-2**2 / 24.0 * 2.0 * 0.3 * (4.0 * np.pi) ** 2 if method == "natural" else 1e-9)
+    with pytest.raises(ephs.AssemblyError, match="contradicts the joints"):
+        ephs.simulate(scene, 0.1, method=method, step=1e-2, initial=arrived)
+    with pytest.raises(ephs.SceneError, match=r"joints\.pin\.motion: found a rate of 1, expected 3\.76991"):
+        ephs.simulate(scene.with_state(rates={"pin": 1.0}), 0.1, method=method, step=1e-2)

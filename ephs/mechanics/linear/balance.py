@@ -5,6 +5,7 @@ import numpy as np
 from ephs.mechanics.dynamics import Dynamics, State
 from ephs.mechanics.linear.continuation import StaticPath, follow, metric_of
 from ephs.mechanics.linear.freedoms import freedoms_of, lengths_of, resting, unbalanced
+from ephs.mechanics.linear.structure import largest_entry
 from ephs.mechanics.tree.finding.spanning import Edge
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import metric_eigen
@@ -78,12 +79,13 @@ def _descended(model: Dynamics, state: State, lengths: list[int]) -> tuple[State
         push = ways.T @ force
         push[flat & (np.abs(push) <= UNFELT * np.abs(push).max(initial=0.0))] = 0.0
         most = max(float(size.max(initial=0.0)), TINY)
-        reach = float(np.abs(metric * (Z @ (ways @ (push / np.maximum(size, ELIMINATION * most))))).max(initial=0.0))
+        farthest = Z @ (ways @ (push / np.maximum(size, max(ELIMINATION * most, TINY))))
+        reach = largest_entry(metric * farthest)
         best, stalled = (reach, 0) if reach < 0.5 * best else (best, stalled + 1)
         if left <= STALLED and (reach <= ENOUGH or (reach <= ROUNDED and stalled >= 3)):
             return state, left, step
         change = Z @ (ways @ (push / np.where(flat, most, size)))
-        change /= max(1.0, float(np.abs(change).max(initial=0.0)) / STRIDE)
+        change /= max(1.0, largest_entry(change) / STRIDE)
         state = _nearest(model, state, change, lengths)
     raise restless(*_culprit(model, state))
 
@@ -109,7 +111,7 @@ def _still(model: Dynamics, state: State) -> Array:
 
 def _culprit(model: Dynamics, state: State) -> tuple[str, str]:
     """The joint that accelerates most from rest, and how."""
-    found = {name: float(np.abs(a).max(initial=0.0)) for name, a in model.acceleration(state).items()}
+    found = {name: largest_entry(a) for name, a in model.acceleration(state).items()}
     name = max(found, key=lambda n: found[n])
     what = f"from rest it still accelerates by {found[name]:.3g} rad/s² or m/s²"
     driven = [n for n, parts in model.layout.edges.items() if any(_driven(model, edge) for _, edge in parts)]

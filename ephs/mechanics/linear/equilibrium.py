@@ -99,28 +99,19 @@ def equilibrium(
     from ephs.mechanics.linear.balance import restless
 
     try:
-        return _equilibrium(model, initial, inputs, reference)
+        if isinstance(model, System):
+            from ephs.mechanics.linear.pencil import system_problem
+            from ephs.mechanics.linear.settling import settled
+
+            return Equilibrium(model, *settled(system_problem(model, initial, inputs, reference)))
+        if not isinstance(model, Scene):
+            raise no_model(model)
+        for key, value in (("initial", initial), ("inputs", inputs), ("reference", reference)):
+            if value is not None:
+                raise OptionError(key, value, "none, of a scene: vary the scene instead")
+        return _of_scene(model)
     except ArithmeticError as error:  # an eigenvalue or a rate that is no number
         raise restless("", str(error)) from error
-
-
-def _equilibrium(
-    model: System | Scene,
-    initial: "Mapping[str, ArrayLike] | None",
-    inputs: Mapping[str, Any] | None,
-    reference: Reference | None,
-) -> Equilibrium:
-    if isinstance(model, System):
-        from ephs.mechanics.linear.pencil import system_problem
-        from ephs.mechanics.linear.settling import settled
-
-        return Equilibrium(model, *settled(system_problem(model, initial, inputs, reference)))
-    if not isinstance(model, Scene):
-        raise no_model(model)
-    for key, value in (("initial", initial), ("inputs", inputs), ("reference", reference)):
-        if value is not None:
-            raise OptionError(key, value, "none, of a scene: vary the scene instead")
-    return _of_scene(model)
 
 
 def _keeps(of: Element) -> bool:
@@ -139,10 +130,9 @@ def _of_scene(scene: Scene) -> Equilibrium:
     if sprung and any(True for _ in scene.all_loads()):
         found = f"a scene with {sprung[0]} and loads"
         raise OptionError("model", found, "a scene with only one of both, or its system")
-    laws = {name: joint.motion for name, joint in scene.all_joints() if joint.motion is not None}
-    moving = [name for name, law in laws.items() if any(map(law.rate, np.linspace(0.0, 1.0, SAMPLES).tolist()))]
-    if moving:
-        raise restless(f"joints.{moving[0]}", "its motion is prescribed")
+    for name, joint in scene.all_joints():
+        if joint.motion is not None and any(map(joint.motion.rate, np.linspace(0.0, 1.0, SAMPLES).tolist())):
+            raise restless(f"joints.{name}", "its motion is prescribed")
     joints = {name: joint.dim for name, joint in [*scene.all_joints(), *scene.implicit_joints()]}
     still = scene.with_state(rates={name: np.zeros(dim) for name, dim in joints.items()})
     model = dynamics(still)

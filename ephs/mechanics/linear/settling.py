@@ -7,6 +7,7 @@ import numpy as np
 from ephs.mechanics.linear.balance import STALLED, balanced, restless
 from ephs.mechanics.linear.freedoms import lengths_of
 from ephs.mechanics.linear.pencil import Pencil, mechanism_of
+from ephs.mechanics.linear.structure import largest_entry
 from ephs.mechanics.runs.assembling import FlatJoints, assembled, flat_joints
 from ephs.mechanics.tree.finding.frames import frames_of
 from ephs.mechanics.tree.finding.tendons import tendon_lengths
@@ -46,7 +47,7 @@ def settled(problem: Problem) -> At:
         raise restless(error.path, error.equation or error.outcome.value) from error.cause
     for slot in _momenta(d):  # its forces are balanced, as a part of their sizes, which no state is
         rates[slot.rates] = 0.0
-    left = float(np.abs(rates[pencil.counted]).max(initial=0.0)) / max(float(np.abs(x).max(initial=0.0)), LEAST)
+    left = largest_entry(rates[pencil.counted]) / max(largest_entry(x), LEAST)
     return (start, left, steps) if left <= STALLED else _at_rest(problem, pencil, x)
 
 
@@ -92,22 +93,22 @@ def _at_rest(problem: Problem, pencil: Pencil, x: Array) -> At:
                 continue
             z, before = found, x
             x = d.advance(x, h * z[: pencil.n_w])
-            size = max(float(np.abs(x).max(initial=0.0)), LEAST)
-            moved = float(np.abs(x - before).max(initial=0.0)) / size
-            left = float(np.abs(z[: pencil.n_w][pencil.counted]).max(initial=0.0)) / size
+            size = max(largest_entry(x), LEAST)
+            moved = largest_entry(x - before) / size
+            left = largest_entry(z[: pencil.n_w][pencil.counted]) / size
             if not np.isfinite(left) or size > 1e12:
                 break
             if h >= 1e6 and left <= SETTLED:
                 closed = d.pack(_closed(joints, d.unpack(x)))
-                if float(np.abs(closed - x).max(initial=0.0)) <= CLOSES * size:
+                if largest_entry(closed - x) <= CLOSES * size:
                     return d.unpack(closed), left, step
                 x, z, h = closed, np.zeros_like(z), 1e-3
                 continue
             h = min(h * (4.0 if moved < 0.5 else 1.5), 1e12)
     except SolveError as error:
         raise restless(error.path, error.equation or error.outcome.value) from error.cause
-    fastest = max(d.states, key=lambda slot: float(np.abs(z[slot.rates]).max(initial=0.0)))
-    rate = float(np.abs(z[fastest.rates]).max(initial=0.0))
+    fastest = max(d.states, key=lambda slot: largest_entry(z[slot.rates]))
+    rate = largest_entry(z[fastest.rates])
     raise restless(str(fastest.path), f"after {done} steps it still changes by {rate:.3g} a second")
 
 
@@ -132,6 +133,6 @@ def _beyond_half_a_turn(d: Descriptor, change: Array) -> bool:
     """Whether a change of the states goes around: steps of whole turns solve the equations without coming to rest."""
     for slot in d.states:
         group, v = manifold(slot.quantity.space), change[slot.rates]
-        if group.code != VECTOR and float(np.abs(group.log(group.exp(v)) - v).max(initial=0.0)) > 1.0:
+        if group.code != VECTOR and largest_entry(group.log(group.exp(v)) - v) > 1.0:
             return True
     return False

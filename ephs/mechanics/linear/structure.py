@@ -25,7 +25,7 @@ class MeasuredLaw:
     @property
     def defect(self) -> float:
         """The largest difference of the sides, relative to the terms'."""
-        return float(np.abs(self.left - self.right).max(initial=0.0)) / max(self.scale, float(np.finfo(float).tiny))
+        return largest_entry(self.left - self.right) / max(self.scale, float(np.finfo(float).tiny))
 
     def holds(self, rounding: float = ROUNDING) -> bool:
         """Whether the sides agree to rounding."""
@@ -76,7 +76,7 @@ class Sizes:
     @classmethod
     def of(cls, B: Array, C: Array, D: Array) -> "Sizes":
         """Those of matrices that are whole solutions."""
-        return cls(_size(B), _size(C), _size(D))
+        return cls(largest_entry(B), largest_entry(C), largest_entry(D))
 
 
 def laws_of(
@@ -94,11 +94,13 @@ def laws_of(
     J, R, Q = ph.J, ph.R, ph.Q
     least = np.asarray(symmetric_eigenvalues(0.5 * (R + R.T)), dtype=float)
     out = [
-        MeasuredLaw("A = (J − R) Q", A, (J - R) @ Q, _size((np.abs(J) + np.abs(R)) @ np.abs(Q))),
-        MeasuredLaw("J is skew", J, -J.T, _size(J) + _size(R)),
-        MeasuredLaw("R is symmetric", R, R.T, _size(J) + _size(R)),
-        MeasuredLaw("Q is symmetric", Q, Q.T, _size(Q)),
-        MeasuredLaw("R is not negative", np.minimum(least, 0.0), np.zeros_like(least), _size(J) + _size(R)),
+        MeasuredLaw("A = (J − R) Q", A, (J - R) @ Q, largest_entry((np.abs(J) + np.abs(R)) @ np.abs(Q))),
+        MeasuredLaw("J is skew", J, -J.T, largest_entry(J) + largest_entry(R)),
+        MeasuredLaw("R is symmetric", R, R.T, largest_entry(J) + largest_entry(R)),
+        MeasuredLaw("Q is symmetric", Q, Q.T, largest_entry(Q)),
+        MeasuredLaw(
+            "R is not negative", np.minimum(least, 0.0), np.zeros_like(least), largest_entry(J) + largest_entry(R)
+        ),
     ]
     if conjugate:
         gain = np.asarray(symmetric_eigenvalues(D + D.T), dtype=float)
@@ -109,5 +111,6 @@ def laws_of(
     return tuple(out)
 
 
-def _size(matrix: Array) -> float:
-    return float(np.abs(matrix).max(initial=0.0))
+def largest_entry(numbers: Array) -> float:
+    """The largest magnitude; 0 where there is none."""
+    return float(np.abs(numbers).max(initial=0.0))

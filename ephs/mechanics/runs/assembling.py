@@ -190,8 +190,8 @@ def _gears(joints: FlatJoints) -> dict[str, dict[str, float]]:
     return out
 
 
-def check_closed(problem: Problem, momentum: Array) -> None:
-    """Check given initial states against the joints; ``momentum`` (6,) is of the mechanism's mass, length and rate.
+def check_closed(problem: Problem, momentum: Array, t0: float) -> None:
+    """Check given states at t0 s against the joints; ``momentum`` (6,) is of the mechanism's mass, length and rate.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def check_closed(problem: Problem, momentum: Array) -> None:
     """
     d = problem.descriptor
     x = problem.point
-    once = RunRecord(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
+    once = RunRecord(np.array([t0]), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
     assert problem.motion is not None
     motion = problem.motion(solution_of(problem, once, {}))
     if max((float(gap[0]) for gap in motion.gaps(1).values()), default=0.0) > OPEN:

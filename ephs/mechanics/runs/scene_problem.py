@@ -20,6 +20,7 @@ from ephs.mechanics.scene.build import (
     wrench_port,
 )
 from ephs.mechanics.scene.document import scene_to_text
+from ephs.mechanics.scene.errors import SceneError, fault
 from ephs.mechanics.scene.meant import is_shaky
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
@@ -46,12 +47,19 @@ def check_motions(scene: Scene, t0: float) -> None:
     ------
     OptionError
         It names the joint.
+    SceneError
+        It names the joint; the run would start at 0.
     """
     for name, joint in scene.all_joints():
         if joint.motion is None:
             continue
         rate, law = float(joint.rate[0]), joint.motion.rate(t0)
         if abs(rate - law) > NEAR * max(abs(rate), abs(law), abs(joint.motion.acceleration(t0))):
+            if t0 == 0.0:
+                found, who = f"a rate of {rate:.9g}", f"{joint.body1} and {joint.body2}"
+                raise SceneError(
+                    scene.name, [fault("motion differs", f"joints.{name}.motion", found, motion=f"{law:.9g}", who=who)]
+                )
             raise OptionError(
                 "t0", t0, f"a time at which the motion of joints.{name} has the rate {rate:.6g} of the initial state, "
                 f"not {law:.6g}; simulate from 0, and start from scene.at(solution, {t0:g})",
@@ -60,9 +68,12 @@ def check_motions(scene: Scene, t0: float) -> None:
 
 @paused_collector()
 def problem_of_scene(
-    scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
+    scene: Scene,
+    initial: Mapping[str, "ArrayLike"] | None = None,
+    inputs: Mapping[Any, Any] | None = None,
+    t0: float = 0.0,
 ) -> Problem:
-    """The initial value problem of a scene."""
+    """The initial value problem of a scene; ``initial`` states are those at t0 s."""
     if not isinstance(scene, Scene):
         raise no_model(scene)
     view = view_of(scene)
@@ -104,5 +115,5 @@ def problem_of_scene(
     if initial:
         scale, mass = Snapshot.of(scene).scale(world.gravity), sum(body.mass for _, body in scene.all_bodies())
         turning = (mass or 1.0) * scale.rate * scale.length**2
-        check_closed(problem, turning / np.array([1.0] * 3 + [scale.length] * 3))
+        check_closed(problem, turning / np.array([1.0] * 3 + [scale.length] * 3), t0)
     return problem

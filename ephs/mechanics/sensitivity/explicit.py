@@ -262,7 +262,7 @@ class ExplicitTangent:
     def _by(self, number: int, function: Any) -> Array:
         """The derivative of a function of (equations, initial state) by a parameter."""
         step = self.family.parameters[number].step
-        return difference(lambda k: function(*self._other(number, k * step)[1:]), self._stencil(number), step)
+        return difference(lambda e: function(*self._other(number, e)[1:]), self._stencil(number), step)
 
     def _stencil(self, number: int) -> Stencil:
         """Neighbours for derivatives of tables: the two outer ones where these show that the parameter is a

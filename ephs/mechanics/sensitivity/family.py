@@ -74,9 +74,9 @@ def differentiated(parameters: Sequence[str], t: float) -> Iterator[None]:
                           "rods that expand have them at order 2, and ephs.sweep takes all") from error  # fmt: skip
 
 
-def difference(function: Callable[[int], Array], stencil: Stencil, step: float) -> Array:
-    """The derivative of function(multiple of the step)."""
-    return np.asarray(sum(weight * function(k) for k, weight in stencil) / step, dtype=float)
+def difference(function: Callable[[float], Array], stencil: Stencil, step: float) -> Array:
+    """The derivative of a function at 0, by its values at multiples of a step."""
+    return np.asarray(sum(weight * function(k * step) for k, weight in stencil) / step, dtype=float)
 
 
 @final

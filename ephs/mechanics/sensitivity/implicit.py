@@ -197,7 +197,7 @@ class NaturalTangent:
     def _by(self, number: int, function: Callable[[_Side], Array]) -> Array:
         """The derivative of what a model is evaluated from by a parameter."""
         step, stencil = self.family.parameters[number].step, self.family.parameters[number].tables
-        return difference(lambda k: function(self._other(number, k * step)), stencil, step)
+        return difference(lambda e: function(self._other(number, e)), stencil, step)
 
     def _other(self, number: int, offset: float) -> _Side:
         if not offset:

@@ -1,7 +1,7 @@
 """Axes of a sweep: paths, their values, and the resulting members."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
@@ -67,18 +67,12 @@ class Axes:
         """Arrangement of the members."""
         return (self.values[0].size,) if self.paired else tuple(found.size for found in self.values)
 
-    @property
-    def dims(self) -> tuple[str, ...]:
-        """A name for each direction in which they are."""
-        return (MEMBER,) if self.paired else self.names
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the paths in the table, in which a joint's coordinate is that at any time, not the initial one."""
-        initial = [
-            path.startswith("joints.") and re.search(r"\.(coordinate|rate)[\[\]\d]*$", path) for path in self.paths
-        ]
-        return tuple(f"initial.{path}" if first else path for path, first in zip(self.paths, initial, strict=True))
+    def names(self, outputs: Collection[str]) -> tuple[str, ...]:
+        """Names of the paths in the table, in which an output is the number at any time, not the initial one; so are
+        coordinates and rates of joints.
+        """
+        moving = re.compile(r"joints\..*\.(coordinate|rate)[\[\]\d]*")
+        return tuple(f"initial.{path}" if path in outputs or moving.fullmatch(path) else path for path in self.paths)
 
     @property
     def members(self) -> Array:

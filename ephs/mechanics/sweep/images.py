@@ -155,9 +155,10 @@ class Images:
         self._shapes = [a.shape for a in self.made.arrays()]
         self._courses: dict[int, _ValueDependence] = {}
         self._own: list[Index] = []
-        self.columns, self._whole = np.arange(self.base.size), False
+        everything = np.arange(self.base.size)
+        self.columns, self._whole = everything, False
         if not self._followed():
-            self.columns, self._whole = np.arange(self.base.size), True
+            self.columns, self._whole = everything, True
         self._spare.append(self.made)
 
     def anew(self) -> CompiledStart:

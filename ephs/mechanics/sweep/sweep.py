@@ -12,7 +12,7 @@ import numpy as np
 from ephs.mechanics.runs.signals import times_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read
-from ephs.mechanics.sweep.axes import Axes
+from ephs.mechanics.sweep.axes import MEMBER, Axes
 from ephs.mechanics.sweep.job import DONE, Job, MemberBatch
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.semantics.bundles.errors import listed
@@ -101,8 +101,8 @@ def sweep(
     -------
     xarray.Dataset
         Each output over the varied paths (or ``member``), ``t``, and its own components. Varied initial coordinates
-        and rates of joints are called ``initial.joints.…``. ``status`` is ``"done"`` or the
-        reason of a failure, with NaN as outputs; ``steps`` and ``rejected`` are counts.
+        and rates of joints are called ``initial.joints.…``, as are other paths that are outputs. ``status`` is
+        ``"done"`` or the reason of a failure, with NaN as outputs; ``steps`` and ``rejected`` are counts.
 
     Raises
     ------
@@ -207,13 +207,15 @@ def _table(job: Job, batches: Sequence[MemberBatch], model: "System | Scene", se
         steps[batch.numbers], rejected[batch.numbers] = batch.steps, batch.rejected
     variables: dict[str, Any] = {}
     places: dict[str, Any] = {}
+    names = axes.names([output.name for output in job.outputs])
+    members = (MEMBER,) if axes.paired else names
     for i, output in enumerate(job.outputs):
         found = [(batch.numbers, batch.values[i]) for batch in batches if batch.values]
         width = found[0][1].shape[2] if found else 1
         whole = np.full((count, instants, width), np.nan)
         for numbers, values in found:
             whole[numbers] = values
-        dims = (*axes.dims, "t")
+        dims = (*members, "t")
         whole = whole.reshape(*axes.shape, instants, width)
         attributes = {"units": output.labels.unit}
         if width == 1:
@@ -222,10 +224,9 @@ def _table(job: Job, batches: Sequence[MemberBatch], model: "System | Scene", se
         variables[output.name] = ((*dims, output.labels.dimension), whole, attributes)
         places[output.labels.dimension] = list(output.labels.names)
     for name, values in (("status", status.astype(str)), ("steps", steps), ("rejected", rejected)):
-        variables[name] = (axes.dims, values.reshape(axes.shape))
+        variables[name] = (members, values.reshape(axes.shape))
     coordinates = {
-        name: (axes.dims if axes.paired else (name,), values)
-        for name, values in zip(axes.names, axes.values, strict=True)
+        name: (members if axes.paired else (name,), values) for name, values in zip(names, axes.values, strict=True)
     }
     times = ("t", job.save_at, {"units": "s"})
     attributes = {

@@ -23,6 +23,7 @@ from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.dynamics.mujoco_scenes import accelerations, joints, stripped
 from tests.numerics import jacobian, largest, slope
 from tests.scenes import shipped
+from tests.written import scene_of_text
 
 
 def extrapolated(function, h=1e-2):
@@ -338,6 +339,42 @@ def test_matrices_are_saved(tmp_path, suffix):
         assert np.array_equal(np.asarray(data[key]), getattr(found, key))
     with pytest.raises(ephs.OptionError, match="ends in"):
         found.save(tmp_path / "chain.mat")
+
+
+PRESSED = """
+format = 1
+name = "pressed"
+[bodies.ball]
+mass = 2.0
+inertia = [0.01, 0.01, 0.01]
+position = [0.0, 0.0, {height}]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "ball"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+[surfaces.ball]
+body = "ball"
+shape = {{ sphere = 0.1 }}
+[surfaces.floor]
+body = "ground"
+shape = {{ plane = {{}} }}
+[contacts.c]
+surfaces = ["ball", "floor"]
+stiffness = 1e5
+exponent = {exponent}
+"""
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("height", [0.1, 0.3])
+def test_a_ball_sinks_into_a_floor_and_swings_on_it_as_the_law_of_contact_says(height, exponent):
+    """From the air and from where it touches, where nothing is stiff: k dⁿ = m g, ω² = n g / d."""
+    rest = ephs.equilibrium(scene_of_text(PRESSED.format(height=height, exponent=exponent))).model
+    depth = (2.0 * 9.81 / 1e5) ** (1.0 / exponent)
+    assert 0.1 - rest.body("ball").pose[6] == pytest.approx(depth, rel=1e-9)
+    fastest = max(mode.frequency for mode in ephs.linearize(rest).modes)
+    assert fastest == pytest.approx(np.sqrt(exponent * 9.81 / depth) / (2.0 * np.pi), rel=1e-9)
 
 
 @pytest.mark.parametrize(

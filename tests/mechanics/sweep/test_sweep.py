@@ -15,7 +15,7 @@ from ephs.cli import main
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
-from ephs.mechanics.sweep.outputs import outputs_of
+from ephs.mechanics.sweep.outputs import known_outputs, outputs_of
 from ephs.testing import mechanisms
 from tests.numerics import largest
 from tests.oscillator import free_oscillator
@@ -303,6 +303,19 @@ def test_what_a_cluster_forgets_is_asked_for_again(monkeypatch):
 def test_wrong_questions_are_refused(vary, more, says):
     with pytest.raises(ephs.OptionError, match=says):
         ephs.sweep(ephs.load(CHAIN), vary, 0.1, **more)
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_what_is_varied_at_the_start_is_read_at_any_time(paired):
+    """Each number at the start that is an output, too, by the same name."""
+    scene = ephs.load(SCENES / "hot-brake.toml")
+    both = sorted({*names(scene)} & known_outputs(scene).keys())
+    assert {path.partition(".")[0] for path in both} == {"joints", "thermal"}
+    for path in both:
+        values = [read(scene, path), read(scene, path) + 1.0]
+        table = ephs.sweep(scene, {path: values}, 0.01, outputs=[path], paired=paired)
+        assert table[f"initial.{path}"].values.tolist() == values
+        np.testing.assert_allclose(table[path].values[:, 0], values, rtol=1e-12)
 
 
 def test_an_unknown_path_names_the_nearest():
