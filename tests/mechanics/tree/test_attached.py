@@ -126,7 +126,11 @@ def tied_arm():
     return system, start, {"x": (-1.5, False)}
 
 
-MACHINES = [motor, warm_beam, tied_arm]
+def geared():
+    return machines.train([(False, 0.3), (True, 0.2), (False, 0.1)], [((0, 1, 2), (1.0, -2.0, 0.5))])
+
+
+MACHINES = [motor, warm_beam, tied_arm, geared]
 
 
 @pytest.mark.parametrize("machine", MACHINES)
