@@ -12,7 +12,6 @@ import ephs
 from ephs import Pattern, library
 from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
-from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.system_problem import problem_of_system
@@ -21,7 +20,7 @@ from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.embedded import embedded_radau
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
-from tests.numerics import EPS, largest
+from tests.numerics import largest
 from tests.scenes import model_of
 from tests.written import scene_of_text
 
@@ -53,14 +52,10 @@ def diagonal(stages):
     return pade(stages, stages)
 
 
-def square(a, count):
-    """The matrix of so many stages, the first of which has no row."""
-    return np.array([[0.0] * count, *([*row, *[0.0] * (count - len(row))] for row in a)])
-
-
 def explicit(a, b):
     """1 + Σ z^(k+1) bᵀ Aᵏ 1."""
-    n, matrix = len(b), square(a, len(b))
+    n = len(b)
+    matrix = np.array([[0.0] * n, *([*row, *[0.0] * (n - len(row))] for row in a)])
     weights = [float(np.array(b) @ np.linalg.matrix_power(matrix, k) @ np.ones(n)) for k in range(n)]
     return lambda z: rational([1.0, *weights], [1.0], z)
 
@@ -217,55 +212,3 @@ def test_the_estimate_of_radau_is_the_filtered_defect_of_the_embedded_method(h, 
     found, end = embedded_radau(count, matrix, y, h)
     expected = np.abs(found) / (rtol + rtol * np.maximum(np.abs(y), np.abs(end)))
     assert attempt.error == pytest.approx(expected.max(), rel=1e-4, abs=1e-7)
-
-
-# ---- the coefficients -------------------------------------------------------------------------------------------
-
-EXPLICIT = {
-    "rk54": (tableaux.A5, tableaux.B5, tableaux.C5, {4: tableaux.E5}),
-    "rk87": (tableaux.A8, tableaux.B8, tableaux.C8, {5: tableaux.E8_5, 3: tableaux.E8_3}),
-}
-"""Coefficients, and estimates by the order up to which they vanish."""
-
-
-def grown(tree):
-    """Rooted trees, each the sorted tuple of those on its root, with a leaf more."""
-    yield tuple(sorted((*tree, ())))
-    for i, branch in enumerate(tree):
-        yield from (tuple(sorted((*tree[:i], more, *tree[i + 1 :]))) for more in grown(branch))
-
-
-def size(tree):
-    return 1 + sum(map(size, tree))
-
-
-def density(tree):
-    return size(tree) * math.prod(map(density, tree))
-
-
-def stages(matrix, tree):
-    """What the stages make of a tree: the product of what they make of its branches, each by the matrix."""
-    return math.prod((matrix @ stages(matrix, branch) for branch in tree), start=np.ones(len(matrix)))
-
-
-@pytest.mark.parametrize("name", EXPLICIT)
-def test_coefficients_meet_the_conditions_of_all_trees_up_to_their_order_and_no_further(name):
-    """Hairer, Nørsett and Wanner, theorem II.2.13: Σ bᵢ Φᵢ = 1/γ; the last row is the step, which estimates may use."""
-    a, b, c, estimates = EXPLICIT[name]
-    matrix = square([*a, b], len(b) + 1)
-    assert largest(matrix.sum(axis=1) - [*c, *[1.0] * (len(b) + 1 - len(c))]) <= 64 * EPS
-    trees, missed = {()}, {"the step": [], **{order: [] for order in estimates}}
-    for order in range(1, tableau(name).order + 2):
-        for tree in trees:
-            sides = {
-                "the step": (matrix[-1], 1.0 / density(tree)),
-                **{k: (np.array(e), 0.0) for k, e in estimates.items()},
-            }
-            for key, (weights, exact) in sides.items():
-                rounding = 64 * EPS * np.abs(weights) @ stages(np.abs(matrix), tree)
-                if abs(weights @ stages(matrix, tree) - exact) > rounding:
-                    missed[key].append(order)
-        trees = {more for tree in trees for more in grown(tree)}
-    assert {key: min(orders) - 1 for key, orders in missed.items()} == {
-        "the step": tableau(name).order, **{order: order for order in estimates},
-    }  # fmt: skip
