@@ -149,35 +149,6 @@ def test_a_tolerance_for_one_joint_steers_by_it():
     assert tight.stats["steps"] > 2 * loose.stats["steps"]
 
 
-@pytest.mark.parametrize("model", [BY_NAME["heavy-top"].scene(), OSCILLATOR], ids=["scene", "system"])
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"rtol": -1.0}, "rtol is -1.0"),
-        ({"atol": {"entropi": 1e-3}}, r"atol\['entropi'\]"),
-        ({"rtol": "fine"}, "rtol is 'fine'"),
-        ({"rtol": 0.0, "atol": 0.0}, "rtol or atol > 0"),
-        ({"method": "euler"}, "one of auto, natural"),
-        ({"step": float("nan")}, "step is nan"),
-        ({"step": -0.1}, "step is -0.1"),
-        ({"step": 0.0}, "step is 0.0"),
-        ({"atol": float("nan")}, "atol is nan"),
-        ({"max_step": -1.0}, "max_step is -1.0"),
-        ({"min_step": -1.0}, "min_step"),
-        ({"min_step": 1.0, "max_step": 0.1}, "min_step is 1.0"),
-        ({"events": [3]}, "events is 3"),
-        ({"events": [ephs.Event(len, "a"), ephs.Event(len, "a")]}, "names that differ"),
-        ({"options": {"rho": 0.5}, "method": "rk54"}, "options of rk54: keep"),
-        ({"method": "variational"}, "takes constant steps"),
-        ({"until": float("inf")}, "until is inf"),
-        ({"until": 0.0}, "until is 0.0"),
-    ],
-)
-def test_bad_options_are_refused_by_name(options, words, model):
-    with pytest.raises(ephs.OptionError, match=words):
-        ephs.simulate(model, **{"until": 1.0, **options})
-
-
 @pytest.mark.parametrize("former", registry.REPLACED)
 def test_names_of_former_methods_take_what_is_in_their_place_with_a_warning(former):
     scene, run = BY_NAME["heavy-top"].scene(), {"rtol": 1e-6, "atol": 1e-9}
