@@ -75,21 +75,6 @@ def test_directions_of_events(level, direction):
     assert np.allclose([c.t for c in sol.events], expected, atol=1e-6)
 
 
-def test_events_survive_a_file(tmp_path):
-    scene = shipped("heavy-top")
-
-    def quarter(t, state):
-        return t - 0.25
-
-    sol = ephs.simulate(scene, 0.5, events=[quarter])
-    sol.save(tmp_path / "solution.nc")
-    again = ephs.load_solution(tmp_path / "solution.nc")
-    assert [c.name for c in again.events] == ["quarter"]
-    assert again.events[0].t == sol.events[0].t == pytest.approx(0.25, abs=1e-14)
-    for path, value in sol.events[0].state.items():
-        assert np.array_equal(again.events[0].state[path], value)
-
-
 def test_a_function_without_value_is_an_error_that_keeps_the_solution():
     with pytest.raises(ephs.SimulationError, match="an event's function has no value") as caught:
         ephs.simulate(OSCILLATOR, 1.0, initial={"pe.q": 1.0}, events=[lambda t, s: np.nan if t > 0.5 else 1.0])

@@ -16,6 +16,7 @@ from ephs.mechanics.shapes.gap import UPRIGHT
 from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
 from tests.mechanics.imports.by_mujoco import compiled, forward
+from tests.mechanics.shapes.test_meshes import prism
 
 SINGLE = 1e-6
 """MuJoCo keeps meshes in single precision, and its general distances have this tolerance."""
@@ -23,8 +24,9 @@ SIZE = {"sphere": "0.1", "capsule": "0.1 0.2", "box": "0.1 0.2 0.3", "cylinder":
 numbers = st.floats(0.25, 4.0, width=16)
 
 
-def loaded(text, folder, **options):
-    file = folder / "model.xml"
+def loaded(text, folder, suffix="xml", **options):
+    """The scene of a model with its surfaces, and all that was said of it."""
+    file = folder / f"model.{suffix}"
     file.write_text(text, encoding="utf-8")
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -142,9 +144,7 @@ def test_distances_are_those_of_mujoco(kind, data, tmp_path_factory):
 
 def ring(count, height=0.1):
     """Vertices of a prism with 2 count corners."""
-    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    ends = [np.stack([np.cos(angle), np.sin(angle), 0.0 * angle + z], axis=1) for z in (-height, height)]
-    return " ".join(f"{x:.9g}" for x in np.concatenate(ends).ravel())
+    return " ".join(f"{x:.9g}" for x in prism(count, -height, height).ravel())
 
 
 NOTES = {

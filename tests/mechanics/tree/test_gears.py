@@ -13,7 +13,7 @@ import ephs
 from ephs.mechanics.tree.finding.frames import Unplaced
 from tests.mechanics.tree.general import held_to_the_general_form
 from tests.mechanics.tree.machines import GRAVITY, WHEEL, train
-from tests.mechanics.tree.test_attached import equations_of
+from tests.mechanics.tree.test_attached import assert_dense_rates_agree, equations_of
 
 UNTIL = 0.5
 AWAY, MESHED = 0.4, 0.7
@@ -78,11 +78,7 @@ def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
     by_joint = eq.layout.by_joint(state.r)
     for wheels, ratios in gears:
         assert abs(sum(g * by_joint[f"h{k}"][0] for k, g in zip(wheels, ratios, strict=True))) <= 1e-12
-    y = eq.vector(state)
-    fast, slow = eq.rates(0.0, state.q, y), np.zeros(eq.size)
-    assert eq.dense.rates(state.q, y, eq.given, eq.heats, slow) == (0, 0)
-    where = slice(eq.nv, eq.nv + eq.n)
-    assert np.allclose(fast[where], slow[where], rtol=1e-10, atol=1e-10)
+    assert_dense_rates_agree(eq, state)
     held_to_the_general_form(eq, eq.problem, state)
 
 
