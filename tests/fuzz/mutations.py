@@ -3,13 +3,14 @@
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterator, MutableMapping, MutableSequence
+from collections.abc import Callable, Iterator, MutableMapping
 from copy import deepcopy
 from functools import lru_cache
 from random import Random
 from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.sax.saxutils import escape, quoteattr
 
 from tests.fuzz.words import SPLINTERS, number, text, value
 
@@ -222,63 +223,41 @@ def _of_json(source: str, other: str, random: Random) -> bytes | None:
 
 def _of_xml(source: str, other: str, random: Random) -> bytes | None:
     try:
-        root, second = ElementTree.fromstring(source), ElementTree.fromstring(other)
+        tree, second = (_xml_tree(ElementTree.fromstring(each)) for each in (source, other))
     except ElementTree.ParseError:
         return None
-    others = list(second.iter())
-    for _ in _times(random):
-        every = list(root.iter())
-        element, another = random.choice(every), random.choice(every)
-        parents = {child: parent for parent in every for child in parent}
-        match random.randint(0, 12):
-            case 0 | 1 | 2 if element.attrib:
-                name = random.choice(list(element.attrib))
-                element.set(name, _word(element.attrib[name], random))
-            case 3 if element.attrib:
-                del element.attrib[random.choice(list(element.attrib))]
-            case 4:
-                names = [name for each in (*every, *others) for name in each.attrib]
-                element.set(random.choice(names or ["name"]), _word("", random))
-            case 5 | 6:
-                element.text = _word(element.text or "", random)
-            case 7 if element in parents:
-                parents[element].remove(element)
-            case 8 if element in parents:
-                parents[element].insert(random.randint(0, 5), deepcopy(element))
-            case 9:
-                another.append(deepcopy(random.choice(others)))
-            case 10:
-                element.tag = random.choice((*every, *others)).tag if random.random() < 0.8 else "a"
-            case 11 if another.attrib and element.attrib:  # the name of something else
-                element.set(random.choice(list(element.attrib)), random.choice(list(another.attrib.values())))
-            case _:
-                _nested(element, random)
-    return ElementTree.tostring(root, encoding="unicode").encode("utf-8", "surrogatepass")
+    return _xml(_rebuilt(tree, second, random)).encode("utf-8", "surrogatepass")
 
 
-def _word(old: str, random: Random) -> str:
-    """A text, or numbers in the place of numbers; XML has no control characters."""
-    words = old.split()
-    match random.randint(0, 3):
-        case 0 if words:
-            words[random.randrange(len(words))] = str(number(random))
-            found = " ".join(words)
-        case 1:
-            found = " ".join(str(number(random)) for _ in range(random.choice((1, 2, 3, 4, 6, 7, 300))))
-        case _:
-            found = text(random)
+def _xml_tree(element: Element) -> dict[str, Any]:
+    """Tag, text, attributes, and the elements in it; texts and attributes as lists of words and numbers."""
+    words = {"text": element.text or "", **element.attrib}
+    entries = {name: [_read(word) for word in text.split()] for name, text in words.items()}
+    return {"tag": element.tag, "in": list(map(_xml_tree, element)), **entries}
+
+
+def _read(word: str) -> Any:
+    try:
+        return json.loads(word)
+    except ValueError:
+        return word
+
+
+def _xml(tree: Any, tag: str = "a") -> str:
+    """What is in lists and tables, where no element belongs, as elements; all else as texts."""
+    tree = tree if isinstance(tree, dict) else {"in" if isinstance(tree, list) else "text": tree}
+    inner, entries = tree.get("in"), [(key, tree[key]) for key in tree if key not in ("tag", "in", "text")]
+    content = escape(_words(tree.get("text", ""))) + "".join(map(_xml, inner if isinstance(inner, list) else ()))
+    content += "".join(_xml(entry, _words(key)) for key, entry in entries if isinstance(entry, dict))
+    given = "".join(f" {key}={quoteattr(_words(entry))}" for key, entry in entries if not isinstance(entry, dict))
+    tag = _words(tree.get("tag", tag))
+    return f"<{tag}{given}>{content}</{tag}>"
+
+
+def _words(entry: Any) -> str:
+    """Texts and numbers after each other; XML has no control characters."""
+    found = " ".join(map(str, entry)) if isinstance(entry, list) else str(entry)
     return re.sub(r"[\x00-\x08\x0b\x0c\x0e-\x1f]", "", found)
-
-
-def _nested(element: Element, random: Random) -> None:
-    """Put copies of an element's content into it, deeper and deeper."""
-    depth = random.choice((1, 3, 3, 20, 190, 300))
-    inner: MutableSequence[Any] = list(element)[:2] if depth < 20 else []
-    place = element
-    for _ in range(depth):
-        place = ElementTree.SubElement(place, element.tag, dict(element.attrib))
-        for child in inner:
-            place.append(deepcopy(child))
 
 
 STRUCTURES: dict[str, Callable[[str, str, Random], bytes | None]] = {

@@ -75,21 +75,6 @@ def test_directions_of_events(level, direction):
     assert np.allclose([c.t for c in sol.events], expected, atol=1e-6)
 
 
-def test_events_survive_a_file(tmp_path):
-    scene = shipped("heavy-top")
-
-    def quarter(t, state):
-        return t - 0.25
-
-    sol = ephs.simulate(scene, 0.5, events=[quarter])
-    sol.save(tmp_path / "solution.nc")
-    again = ephs.load_solution(tmp_path / "solution.nc")
-    assert [c.name for c in again.events] == ["quarter"]
-    assert again.events[0].t == sol.events[0].t == pytest.approx(0.25, abs=1e-14)
-    for path, value in sol.events[0].state.items():
-        assert np.array_equal(again.events[0].state[path], value)
-
-
 def test_a_function_without_value_is_an_error_that_keeps_the_solution():
     with pytest.raises(ephs.SimulationError, match="an event's function has no value") as caught:
         ephs.simulate(OSCILLATOR, 1.0, initial={"pe.q": 1.0}, events=[lambda t, s: np.nan if t > 0.5 else 1.0])
@@ -147,35 +132,6 @@ def test_a_tolerance_for_one_joint_steers_by_it():
     loose = ephs.simulate(scene, 1.0, method="rk54", rtol=0.0, atol=1e-3)
     tight = ephs.simulate(scene, 1.0, method="rk54", rtol=0.0, atol={"*": 1e-3, f"joints.{joint}": 1e-9})
     assert tight.stats["steps"] > 2 * loose.stats["steps"]
-
-
-@pytest.mark.parametrize("model", [BY_NAME["heavy-top"].scene(), OSCILLATOR], ids=["scene", "system"])
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"rtol": -1.0}, "rtol is -1.0"),
-        ({"atol": {"entropi": 1e-3}}, r"atol\['entropi'\]"),
-        ({"rtol": "fine"}, "rtol is 'fine'"),
-        ({"rtol": 0.0, "atol": 0.0}, "rtol or atol > 0"),
-        ({"method": "euler"}, "one of auto, natural"),
-        ({"step": float("nan")}, "step is nan"),
-        ({"step": -0.1}, "step is -0.1"),
-        ({"step": 0.0}, "step is 0.0"),
-        ({"atol": float("nan")}, "atol is nan"),
-        ({"max_step": -1.0}, "max_step is -1.0"),
-        ({"min_step": -1.0}, "min_step"),
-        ({"min_step": 1.0, "max_step": 0.1}, "min_step is 1.0"),
-        ({"events": [3]}, "events is 3"),
-        ({"events": [ephs.Event(len, "a"), ephs.Event(len, "a")]}, "names that differ"),
-        ({"options": {"rho": 0.5}, "method": "rk54"}, "options of rk54: keep"),
-        ({"method": "variational"}, "takes constant steps"),
-        ({"until": float("inf")}, "until is inf"),
-        ({"until": 0.0}, "until is 0.0"),
-    ],
-)
-def test_bad_options_are_refused_by_name(options, words, model):
-    with pytest.raises(ephs.OptionError, match=words):
-        ephs.simulate(model, **{"until": 1.0, **options})
 
 
 @pytest.mark.parametrize("former", registry.REPLACED)

@@ -4,7 +4,6 @@ The equation is that of a disc on a torsion spring with friction, y' = A y with 
 """
 
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ import ephs
 from ephs import Pattern, library
 from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
-from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.system_problem import problem_of_system
@@ -57,9 +55,7 @@ def diagonal(stages):
 def explicit(a, b):
     """1 + Σ z^(k+1) bᵀ Aᵏ 1."""
     n = len(b)
-    matrix = np.zeros((n, n))
-    for i, row in enumerate(a, 1):
-        matrix[i, : len(row)] = row
+    matrix = np.array([[0.0] * n, *([*row, *[0.0] * (n - len(row))] for row in a)])
     weights = [float(np.array(b) @ np.linalg.matrix_power(matrix, k) @ np.ones(n)) for k in range(n)]
     return lambda z: rational([1.0, *weights], [1.0], z)
 
@@ -216,62 +212,3 @@ def test_the_estimate_of_radau_is_the_filtered_defect_of_the_embedded_method(h, 
     found, end = embedded_radau(count, matrix, y, h)
     expected = np.abs(found) / (rtol + rtol * np.maximum(np.abs(y), np.abs(end)))
     assert attempt.error == pytest.approx(expected.max(), rel=1e-4, abs=1e-7)
-
-
-# ---- the coefficients -------------------------------------------------------------------------------------------
-
-
-def _fraction(x):
-    """The rational number of small denominator next to a rounded one."""
-    return Fraction(x).limit_denominator(10**6)
-
-
-def _times(x, y):
-    return [a * b for a, b in zip(x, y, strict=True)]
-
-
-def test_the_coefficients_of_order_five_meet_the_conditions_of_their_orders_as_rational_numbers():
-    """Hairer, Nørsett and Wanner, table II.2.2; of the estimate's weights all up to order 4 vanish."""
-    weights = [_fraction(x) for x in tableaux.B5]
-    a = [[], *([_fraction(x) for x in row] for row in tableaux.A5), weights]
-    c = [*(_fraction(x) for x in tableaux.C5), Fraction(1)]
-    assert [sum(row, Fraction(0)) for row in a] == c
-
-    def through(values):
-        return [sum((x * v for x, v in zip(row, values, strict=False)), Fraction(0)) for row in a]
-
-    square, cube = _times(c, c), _times(c, _times(c, c))
-    inner = through(c)
-    trees = [
-        (1, [Fraction(1)] * len(c), 1), (2, c, 2), (3, square, 3), (3, inner, 6), (4, cube, 4),
-        (4, _times(c, inner), 8), (4, through(square), 12), (4, through(inner), 24), (5, _times(cube, c), 5),
-        (5, _times(square, inner), 10), (5, _times(inner, inner), 20), (5, _times(c, through(square)), 15),
-        (5, through(cube), 20), (5, _times(c, through(inner)), 30), (5, through(_times(c, inner)), 40),
-        (5, through(through(square)), 60), (5, through(through(inner)), 120),
-    ]  # fmt: skip
-    missed = []
-    for order, values, inverse in trees:
-        assert sum(_times(weights, values[:-1]), Fraction(0)) == Fraction(1, inverse)
-        left = sum(_times([_fraction(x) for x in tableaux.E5], values), Fraction(0))
-        missed += [order] if left else []
-    assert set(missed) == {5}
-
-
-@pytest.mark.parametrize(("name", "a", "b"), [("rk54", tableaux.A5, tableaux.B5), ("rk87", tableaux.A8, tableaux.B8)])
-def test_stability_functions_agree_with_the_exponential_up_to_the_order_that_is_said(name, a, b):
-    matrix = np.zeros((len(b), len(b)))
-    for i, row in enumerate(a, 1):
-        matrix[i, : len(row)] = row
-    found = [float(np.array(b) @ np.linalg.matrix_power(matrix, k) @ np.ones(len(b))) for k in range(len(b))]
-    off = [abs(math.factorial(k + 1) * x - 1.0) > 1e-10 for k, x in enumerate(found)]
-    assert off.index(True) == tableau(name).order
-
-
-def test_the_coefficients_of_order_eight_integrate_polynomials_and_their_estimates_vanish_on_them():
-    a, b, c = tableaux.A8, np.array(tableaux.B8), np.array(tableaux.C8)
-    assert np.allclose([0.0, *(sum(row) for row in a)], c, rtol=0, atol=1e-14)
-    ends = np.append(c, 1.0)
-    for k in range(8):
-        assert abs(b @ c**k - 1.0 / (k + 1)) <= 1e-14
-        assert abs(np.array(tableaux.E8_5) @ ends**k) <= 1e-14 or k >= 5
-        assert abs(np.array(tableaux.E8_3) @ ends**k) <= 1e-14 or k >= 3

@@ -24,6 +24,14 @@ def of_descriptor(sol: ephs.Solution, name: str, i: int) -> np.ndarray:
     return instant(d, problem.reference, d.pack(state), inputs).multiplier(box)
 
 
+def assert_wrenches(text, names, **tolerances):
+    """At the end of a run they are those of the descriptor form."""
+    sol = ephs.simulate(scene_of_text(text), 0.1, method="rk87", **tolerances)
+    for name in names:
+        found, expected = sol.joint(name).wrench[-1], of_descriptor(sol, name, len(sol) - 1)
+        assert largest(found - expected) < 1e-10 * largest(expected)
+
+
 def inputs_of(scene: Scene, seed: int) -> dict[str, object]:
     """A wrench on each body that changes with time, a force on each joint that changes with the state."""
     rng = np.random.default_rng(seed)
@@ -107,10 +115,7 @@ def test_wrenches_of_bodies_with_a_negative_principal_moment_are_those_of_the_de
     at = [0.8, 0.1, 0.0]
     axis = [1.0, 1.0, 0.2]
     """
-    sol = ephs.simulate(scene_of_text(text), 0.1, method="rk87", rtol=1e-9, atol=1e-9)
-    for name in ("pin", "elbow"):
-        found, expected = sol.joint(name).wrench[-1], of_descriptor(sol, name, len(sol) - 1)
-        assert largest(found - expected) < 1e-10 * largest(expected)
+    assert_wrenches(text, ("pin", "elbow"), rtol=1e-9, atol=1e-9)
 
 
 def test_a_weld_transmits_what_the_body_behind_it_needs():
@@ -136,7 +141,4 @@ def test_a_weld_transmits_what_the_body_behind_it_needs():
     bodies = ["rod", "bob"]
     at = [0.8, 0.1, 0.0]
     """
-    sol = ephs.simulate(scene_of_text(text), 0.1, method="rk87")
-    for name in ("pin", "weld"):
-        found, expected = sol.joint(name).wrench[-1], of_descriptor(sol, name, len(sol) - 1)
-        assert largest(found - expected) < 1e-10 * largest(expected)
+    assert_wrenches(text, ("pin", "weld"))

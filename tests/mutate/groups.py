@@ -44,6 +44,7 @@ RUNS = (
     "tests/solve/test_lu.py",
     "tests/solve/test_radau.py",
     "tests/solve/test_integrate.py",
+    "tests/solve/test_own_methods.py",
 )
 
 LONG = Pace(each=10.0, file=90.0, budget=40.0)
@@ -183,6 +184,7 @@ GROUPS = {
             "tests/solve/test_iteration.py",
             f"{MECHANICS}/methods/test_heat.py",
             f"{MECHANICS}/elements/test_contact.py",
+            f"{MECHANICS}/impacts/test_generated.py",
         ),
         pace=Pace(each=30.0, file=300.0, budget=60.0),
     ),

@@ -78,29 +78,6 @@ def test_dense_output_meets_the_times_asked_for(damped):
 
 
 @pytest.mark.parametrize(
-    ("options", "names"),
-    [
-        ({"method": "euler"}, ("euler", "natural")),
-        ({"form": "shiny"}, ("shiny", "reduced")),
-        ({"form": "folded", "method": "radau"}, ("folded", "reduced")),
-        ({"step": -0.1}, ("step", "> 0")),
-        ({"max_steps": 3, "step": 0.1}, ("max_steps", "10 steps")),
-        ({"save_at": [0.5, 0.2]}, ("save_at", "ascending")),
-        ({"save_at": [0.5, 2.0]}, ("save_at", "2.0")),
-        ({"events": [1]}, ("events",)),
-        ({"initial": {"osc.pe.x": 1.0}}, ("osc.pe.x", "osc.pe.q")),
-        ({"initial": {"osc.pe.q": [1.0, 2.0]}}, ("osc.pe.q", "(1,)")),
-        ({"initial": {"osc.pe.q": np.nan}}, ("osc.pe.q", "finite")),
-        ({"inputs": {"nothing": {"flow": 1.0}}}, ("nothing",)),
-    ],
-)
-def test_bad_options_are_named(damped, options, names):
-    with pytest.raises(ValueError, match=".*".join(names[:1])) as caught:
-        ephs.simulate(damped, 1.0, **{"initial": START, **options})
-    assert all(name in str(caught.value) for name in names)
-
-
-@pytest.mark.parametrize(
     ("inputs", "names"),
     [(None, ("p", "open")), ({"p": 1.0}, ("p", "flow")), ({"p": {"force": 1.0}}, ("p", "effort")),
      ({"p": {"flow": [1.0, 2.0]}}, ("p", "1 finite number"))],

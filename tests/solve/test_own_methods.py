@@ -13,8 +13,8 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.solve.methods.orders import MOST, density, order_of, power_of, trees
 from ephs.solve.methods.own import Method, coefficients_of, halved
 
-ORDERS = {"rk54": (5, 5), "rk87": (8, 6)}
-"""Order of a built-in method, and power of h with which its (first) estimate falls."""
+ORDERS = {"rk54": (5, 5), "rk87": (8, 6, 4)}
+"""Order of a built-in method, and powers of h with which its estimates fall."""
 
 
 class Kutta(Method):
@@ -85,10 +85,11 @@ def test_rooted_trees_are_counted_as_by_cayley():
 
 @pytest.mark.parametrize("name", ORDERS)
 def test_built_in_methods_have_the_orders_that_they_are_named_after(name):
-    arrays = tableau(name).arrays
-    a, b = arrays["a"][:-1], arrays["a"][-1]
-    with_end = np.block([arrays["a"], np.zeros((b.size + 1, 1))])
-    assert (order_of(a, b), power_of(with_end, arrays["error"])) == ORDERS[name]
+    method = tableau(name)
+    a, b = method.arrays["a"][:-1], method.arrays["a"][-1]
+    with_end = np.block([method.arrays["a"], np.zeros((b.size + 1, 1))])
+    assert (order_of(a, b), *(power_of(with_end, each) for each in method.estimates)) == ORDERS[name]
+    assert a.sum(axis=1) == pytest.approx(method.c, rel=1e-14)
     a[-1, 0] += 1e-9  # a control: the condition of order 2 sees it
     try:
         assert order_of(a, b) == 1

@@ -5,13 +5,11 @@ import pytest
 
 import ephs
 from ephs.mechanics.elements.joints import joint
-from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.shapes.impact import Impact
 from ephs.semantics.bundles.errors import StructureError
+from tests.mechanics.impacts.test_hard_contact import RUNS, G, run
 from tests.written import scene_of_text
 
-HARD = [name for name, method in METHODS.items() if method.impacts]
-G = 9.81
 HEAD = 'format = 1\nname = "stops"\n[world]\ngravity = [0.0, 0.0, {gravity}]\n'
 BODY = """
 [bodies.{name}]
@@ -48,14 +46,7 @@ def sliding(keys, *, coordinate=0.0, rate=0.0, gravity=0.0):
     return scene_of(block, SLIDE.format(coordinate=coordinate, rate=rate, keys=keys), gravity=gravity)
 
 
-def run(scene, until, method="rk87", step=None, **options):
-    sol = ephs.simulate(scene, until, method=method, step=step, **options)
-    assert np.abs(sol.energy_error).max() <= 1e-11
-    assert sol.stats["least_production"] >= 0.0
-    return sol
-
-
-@pytest.mark.parametrize(("method", "step"), [*((name, 2.0**-5) for name in HARD), ("rk87", None)])
+@pytest.mark.parametrize(("method", "step"), RUNS)
 def test_what_falls_on_a_stop_rests_after_the_last_bounce(method, step):
     """Infinitely many bounces end at √(2H/g)(1 + e)/(1 − e), and all of the energy is heat."""
     fall, e = 0.2, 0.5

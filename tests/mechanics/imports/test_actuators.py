@@ -1,6 +1,5 @@
 """Actuators and tendons of MJCF, transmissions of URDF: the forces are MuJoCo's."""
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +9,7 @@ import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
+from tests.mechanics.imports.by_mujoco import assert_accelerates_alike, compiled, forward
 from tests.mechanics.imports.models import URDF
 
 BODIES = "".join(
@@ -42,30 +42,13 @@ CONTROLS = {"motor": 0.9, "servo": 0.4, "speed": -1.3, "affine": 0.7, "piston": 
 
 def test_forces_of_actuators_and_tendons_are_mujocos(write):
     text = DRIVEN.replace('<body name="e">', '<site name="top"/><body name="e"><site name="tip"/>')
-    path = write(text, "xml")
     with pytest.warns(ephs.ModelWarning) as said:
-        scene = ephs.load(path)
+        scene = ephs.load(write(text, "xml"))
     words = str(said[0].message)
     assert "actuators: muscle, brake, thrust, winch" in words  # its sites meet
     assert "activation of: piston" in words
     assert set(scene.actuators) == set(CONTROLS)
-
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    rng = np.random.default_rng(3)
-    data.qvel[:4] = rates = rng.standard_normal(4)
-    for name, control in CONTROLS.items():
-        data.ctrl[model.actuator(name).id] = control
-    mujoco.mj_forward(model, data)
-
-    model_rates = dict(zip("abcd", rates.tolist(), strict=True))
-    found = ephs.simulate(
-        scene.with_state(rates=model_rates), 1e-6, inputs={f"actuators.{name}": u for name, u in CONTROLS.items()},
-        method="rk87", rtol=1e-12, atol=1e-14, save_at=[0.0, 1e-6],
-    )  # fmt: skip
-    for name, exact in zip("abcd", data.qacc[:4], strict=True):
-        change = np.diff(found.joint(name).rate[:, 0])[0] / 1e-6
-        assert change == pytest.approx(exact, rel=1e-4, abs=1e-3)
+    assert_accelerates_alike(compiled(text), scene, np.random.default_rng(3).standard_normal(4), **CONTROLS)
 
 
 ROPES = """<mujoco><option gravity="0 0 -9.81"/><worldbody><site name="top" pos="0 0 0.9"/>
@@ -86,18 +69,10 @@ MORE = """<spatial name="hoist" stiffness="5"><site site="top"/><site site="a"/>
 
 
 def test_tendons_between_two_points_are_springs_with_mujocos_forces(write):
-    path = write(ROPES.format(more=""), "xml")
-    scene = ephs.load(path)
+    text = ROPES.format(more="")
+    scene = ephs.load(write(text, "xml"))
     assert set(scene.springs) == {"stay", "tackle"}
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    data.qvel[:] = (0.7, -1.1)
-    mujoco.mj_forward(model, data)
-    state = scene.with_state(rates={"shoulder": 0.7, "elbow": -1.1})
-    found = ephs.dynamics(state)
-    assert np.allclose(found.acceleration(found.state0, np.zeros(2)), data.qacc, rtol=1e-10)
-    free = ephs.simulate(state, 0.2, method="rk87", rtol=1e-9)
-    assert free.energy_error.max() < 1e-12
+    assert_accelerates_alike(compiled(text), scene, [0.7, -1.1])
 
 
 def test_other_tendons_through_points_are_said_by_name(write):
@@ -126,10 +101,8 @@ def test_tendons_over_several_bodies_have_mujocos_length_rate_and_forces(tmp_pat
     scene = ephs.load(path)
     cable = " " in rest
     assert set(scene.tendons) == ({"long", "hold_bias", "back"} | ({"long_damping"} if cable else set()))
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:], data.ctrl[:] = drawn[:2], drawn[2:4], drawn[4:]
-    mujoco.mj_forward(model, data)
+    model = compiled(text)
+    data = forward(model, drawn[:2], drawn[2:4], drawn[4:])
     there = scene.with_state(
         *(dict(zip(("shoulder", "elbow"), x.tolist(), strict=True)) for x in (data.qpos, data.qvel))
     )
@@ -174,7 +147,6 @@ SERVO = """<mujoco><worldbody>
 <actuator><position name="servo" joint="h" kp="40" kv="4" ctrlrange="-1 1"/>
 <motor name="push" joint="h" gear="-3" ctrlrange="0.5 2"/><motor name="pull" tendon="both" gear="0.5"/>
 </actuator></mujoco>"""
-DRIVES = ("actuators.servo", "actuators.push", "actuators.pull")
 
 
 @settings(max_examples=10)
@@ -182,14 +154,8 @@ DRIVES = ("actuators.servo", "actuators.push", "actuators.pull")
 def test_dynamics_under_controls_are_mujocos(tmp_path_factory, drawn):
     path = tmp_path_factory.mktemp("model") / "servo.xml"
     path.write_text(SERVO)
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:], data.ctrl[:] = drawn[:2], drawn[2:4], drawn[4:]
-    mujoco.mj_forward(model, data)
-    dynamics = ephs.dynamics(ephs.load(path), inputs=dict(zip(DRIVES, drawn[4:], strict=True)))
-    there = ({"h": x, "k": y} for x, y in (drawn[:2], drawn[2:4]))
-    found = np.concatenate(list(dynamics.acceleration(dynamics.state(*there)).values()))
-    assert np.abs(found - data.qacc).max() < 1e-10 * max(1.0, np.abs(data.qacc).max())
+    controls = dict(zip(("servo", "push", "pull"), drawn[4:], strict=True))
+    assert_accelerates_alike(compiled(path), ephs.load(path), drawn[2:4], drawn[:2], **controls)
 
 
 def test_inputs_of_dynamics_are_numbers(write):

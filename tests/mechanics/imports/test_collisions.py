@@ -14,6 +14,7 @@ from ephs.mechanics.imports.collisions import FRICTION, LOSS, SINKING, SLIP
 from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
+from tests.mechanics.imports.test_mjcf_contacts import loaded
 from tests.mechanics.shapes.test_meshes import binary_stl, cube
 
 SINGLE = 1e-6
@@ -51,16 +52,12 @@ BALL = SOLIDS["sphere"][1]
 GIVEN = {"mu": 0.5, "floor": "", "height": 1.0, "model": "", "pose": "0 0 0 0 0 0", "solid": BALL, "surface": ""}
 
 
-def loaded(text, folder, suffix, **options):
+def beside_meshes(text, folder, suffix, **options):
     (folder / "cube.stl").write_bytes(binary_stl(cube()))
     lines = [f"v {x} {y} {z}" for x, y, z in cube().reshape(-1, 3)]
     lines += [f"f {k} {k + 1} {k + 2}" for k in range(1, len(lines), 3)]
     (folder / "cube.obj").write_text("\n".join(lines), encoding="utf-8")
-    file = folder / f"model.{suffix}"
-    file.write_text(text, encoding="utf-8")
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        return ephs.load(file, contact=True, **options), "\n".join(str(one.message) for one in said)
+    return loaded(text, folder, suffix, **options)
 
 
 def collision(solid, place=(0.0,) * 6, more=""):
@@ -97,7 +94,7 @@ def test_surfaces_of_a_urdf_are_where_mujoco_has_them_and_those_of_an_sdf_there_
     away = np.random.default_rng(way).normal(size=3)
     at = 2.0 * away / np.linalg.norm(away)
     text = robot(collision(SOLIDS[kind][0], place))
-    scene, _ = loaded(text, folder, "urdf")
+    scene, _ = beside_meshes(text, folder, "urdf")
     files = {name: (folder / name).read_bytes() for name in ("cube.stl", "cube.obj")}
     spec = mujoco.MjSpec.from_string(text.replace("package://it/", ""), assets=files)
     spec.worldbody.add_geom(name="ball", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[RADIUS, 0, 0], pos=at)
@@ -109,13 +106,13 @@ def test_surfaces_of_a_urdf_are_where_mujoco_has_them_and_those_of_an_sdf_there_
     (surface,) = scene.surfaces.values()
     assert distance(surface, at) == pytest.approx(expected, abs=10 * SINGLE)
     pose = " ".join(map(repr, place))
-    other, _ = loaded(SDF.format(**GIVEN | {"pose": pose, "solid": SOLIDS[kind][1]}), folder, "sdf")
+    other, _ = beside_meshes(SDF.format(**GIVEN | {"pose": pose, "solid": SOLIDS[kind][1]}), folder, "sdf")
     assert distance(other.surfaces["body_c"], at) == pytest.approx(distance(surface, at), abs=1e-12)
 
 
 def test_links_of_a_urdf_meet_a_floor_and_not_each_other(tmp_path):
     text = robot(collision(SOLIDS["sphere"][0]), collision(SOLIDS["stl"][0]), collision(SOLIDS["box"][0]) * 2)
-    scene, said = loaded(text, tmp_path, "urdf", base="free")
+    scene, said = beside_meshes(text, tmp_path, "urdf", base="free")
     assert set(scene.surfaces) == {"l0", "l1", "l2_1", "l2_2"} and not scene.contacts
     assert "not modelled: contacts between the links of: it" in said
     floor = '\n[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\n'
@@ -135,7 +132,7 @@ def test_links_of_a_urdf_meet_a_floor_and_not_each_other(tmp_path):
 
 def test_a_link_has_the_numbers_that_bullet_reads(tmp_path):
     numbers = '<contact><lateral_friction value="0.25"/><stiffness value="3e4"/></contact>'
-    loaded(robot(collision(SOLIDS["sphere"][0]) + numbers), tmp_path, "urdf")
+    beside_meshes(robot(collision(SOLIDS["sphere"][0]) + numbers), tmp_path, "urdf")
     floor = '[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\n'
     (tmp_path / "hall.toml").write_text(
         'format = 1\nname = "hall"\n[parts.it]\nuse = "model.urdf"\n' + floor, encoding="utf-8"
@@ -149,7 +146,7 @@ def test_a_link_has_the_numbers_that_bullet_reads(tmp_path):
 def test_an_sdf_rests_on_its_ground_with_the_numbers_of_both(tmp_path):
     kp = "<surface><contact><ode><kp>2e4</kp></ode></contact><friction><ode><mu>0.7</mu></ode></friction></surface>"
     soft = "<contact><ode><kp>6e4</kp></ode></contact>"
-    scene, said = loaded(SDF.format(**GIVEN | {"surface": kp, "floor": soft, "height": 0.2}), tmp_path, "sdf")
+    scene, said = beside_meshes(SDF.format(**GIVEN | {"surface": kp, "floor": soft, "height": 0.2}), tmp_path, "sdf")
     (contact,) = scene.contacts.values()
     assert contact.law == ConstitutiveLaw(contact.law.stiffness, loss=LOSS, friction=0.5, slip=SLIP)
     assert contact.law.stiffness == pytest.approx(1.5e4, rel=1e-15)
@@ -166,7 +163,7 @@ def test_links_of_an_sdf_meet_each_other_where_it_says_so(tmp_path):
     )
     joint = '<joint name="j" type="fixed"><parent>a</parent><child>b</child></joint>'
     for model, expected in ((more + joint, 2), (more.replace("true", "false") + joint, 0)):
-        scene, _ = loaded(SDF.format(**GIVEN | {"model": model}), tmp_path, "sdf")
+        scene, _ = beside_meshes(SDF.format(**GIVEN | {"model": model}), tmp_path, "sdf")
         inner = [c for c in scene.contacts.values() if "ground_plane_link_c" not in c.surfaces]
         assert len(scene.contacts) == 3 + expected and len(inner) == expected
 
@@ -176,7 +173,7 @@ def test_a_joint_that_a_mimic_holds_has_no_limits(tmp_path):
     text = text.replace('name="j1" type="fixed">', 'name="j1" type="revolute"><limit lower="-1" upper="1"/>')
     text = text.replace('name="j2" type="fixed">', 'name="j2" type="revolute"><mimic joint="j1" multiplier="0"/>'
                         '<limit lower="-1" upper="1"/>')  # fmt: skip
-    scene, _ = loaded(text, tmp_path, "urdf")
+    scene, _ = beside_meshes(text, tmp_path, "urdf")
     assert scene.joint("j2").limits is None and scene.joint("j2").motion is not None
 
 
@@ -206,10 +203,10 @@ def test_what_is_lost_of_a_urdf_is_said_by_name(kind, tmp_path):
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     dent = [*corners.tolist(), [0.5, 0.5, 0.75]]
     (tmp_path / "dent.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in dent), encoding="utf-8")
-    _, found = loaded(text, tmp_path, "urdf")
+    _, found = beside_meshes(text, tmp_path, "urdf")
     assert re.search(f"not modelled: {said}", found), found
 
 
 def test_a_model_that_is_not_static_moves_beside_the_other(tmp_path):
-    scene, _ = loaded(SDF.format(**GIVEN).replace("<static>true</static>", ""), tmp_path, "sdf")
+    scene, _ = beside_meshes(SDF.format(**GIVEN).replace("<static>true</static>", ""), tmp_path, "sdf")
     assert {name.partition("::")[0] for name in scene.bodies} == {"ground_plane", "it"}

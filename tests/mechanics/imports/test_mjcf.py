@@ -8,6 +8,7 @@ import ephs
 from ephs.mechanics.imports.read import read_model
 from ephs.mechanics.shapes.dry import Dry
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from tests.mechanics.imports.by_mujoco import assert_accelerates_alike, compiled, forward
 from tests.mechanics.imports.models import MODELS, URDF
 
 pytestmark = pytest.mark.filterwarnings("ignore::ephs.ModelWarning")
@@ -47,21 +48,14 @@ def rich(tmp_path):
 
 
 def test_mujoco_accelerates_alike(rich):
-    model = mujoco.MjModel.from_xml_path(str(rich))
-    data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = [0.3, -0.4, 0.5], [1.0, -2.0, 0.5]
-    mujoco.mj_forward(model, data)
-    dynamics = ephs.dynamics(ephs.load(rich))
-    assert dynamics.joints == ("a", "leg0_joint", "leg1_joint")
-    state = dynamics.state(*({name: x[i] for i, name in enumerate(dynamics.joints)} for x in (data.qpos, data.qvel)))
-    found = np.concatenate(list(dynamics.acceleration(state).values()))
-    assert np.abs(found - data.qacc).max() < 1e-11 * np.abs(data.qacc).max()
+    scene = ephs.load(rich)
+    assert ephs.dynamics(scene).joints == ("a", "leg0_joint", "leg1_joint")
+    assert_accelerates_alike(compiled(rich), scene, [1.0, -2.0, 0.5], [0.3, -0.4, 0.5])
 
 
 def test_meshes_are_where_mujoco_has_them(rich):
-    model = mujoco.MjModel.from_xml_path(str(rich))
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model = compiled(rich)
+    data = forward(model)
     body = ephs.load(rich).body("arm")
     (shape,) = body.shapes
     assert shape["mesh"] == str(rich.parent / "parts/wedge.obj")
@@ -98,16 +92,10 @@ def test_dry_friction_of_a_sliding_joint_is_mujocos(write, rate):
         for name, kind, loss in (("turn", 'axis="0 1 0"', 0.7), ("slide", 'type="slide" axis="1 0 1"', 4.0))
     )
     path = write(f"<mujoco><worldbody>{bodies}</body></body></worldbody></mujoco>", "xml")
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    data.qvel[:] = rate, -rate
-    mujoco.mj_forward(model, data)
     scene = ephs.load(path)
     assert (scene.joint("turn").dry, scene.joint("slide").dry) == (Dry(0.7), Dry(4.0))
-    dynamics = ephs.dynamics(scene)
-    found = dynamics.acceleration(dynamics.state(rates={"turn": rate, "slide": -rate}))
     # a regularised law: sqrt(rate² + slip²) = rate (1 + 1e-7)
-    assert np.allclose([found["turn"][0], found["slide"][0]], data.qacc, rtol=1e-6, atol=0.0)
+    assert_accelerates_alike(compiled(path), scene, [rate, -rate], within=1e-6)
 
 
 @pytest.mark.parametrize("ending", [".urdf", ".xml", ".sdf"])
@@ -177,21 +165,13 @@ def test_attached_models_move_as_in_mujoco(tmp_path):
     (tmp_path / "sub/tip.xml").write_text(TIP)
     (tmp_path / "sub/hand.xml").write_text(HAND.format(deeper=deeper, finger=finger))
     (tmp_path / "arm.xml").write_text(ARM)
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
-    data = mujoco.MjData(model)
-    rng = np.random.default_rng(5)
-    data.qpos[:], data.qvel[:] = rng.standard_normal((2, model.nq))
+    model = compiled(tmp_path / "arm.xml")
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    mujoco.mj_forward(model, data)
     scene = ephs.load(tmp_path / "arm.xml")
     names = [model.joint(j).name for j in range(model.njnt)]
     assert names == ["h", "a_k", "a_f_t", "b_k", "b_f_t"] == [*scene.joints]
     assert set(scene.actuators) == {"a_pull", "b_pull"}
-    dynamics = ephs.dynamics(scene)
-    state = dynamics.state(*(dict(zip(names, x, strict=True)) for x in (data.qpos, data.qvel)))
-    rates = dynamics.acceleration(state)
-    found = np.concatenate([rates[name] for name in names])
-    assert np.abs(found - data.qacc).max() < 1e-10 * np.abs(data.qacc).max()
+    assert_accelerates_alike(model, scene, *np.random.default_rng(5).standard_normal((2, model.nq)))
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import re
 import warnings
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,6 +15,8 @@ from ephs.mechanics.imports.mjcf_contacts import LOSS
 from ephs.mechanics.shapes.gap import UPRIGHT
 from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
+from tests.mechanics.imports.by_mujoco import compiled, forward
+from tests.mechanics.shapes.test_meshes import prism
 
 SINGLE = 1e-6
 """MuJoCo keeps meshes in single precision, and its general distances have this tolerance."""
@@ -21,8 +24,9 @@ SIZE = {"sphere": "0.1", "capsule": "0.1 0.2", "box": "0.1 0.2 0.3", "cylinder":
 numbers = st.floats(0.25, 4.0, width=16)
 
 
-def loaded(text, folder, **options):
-    file = folder / "model.xml"
+def loaded(text, folder, suffix="xml", **options):
+    """The scene of a model with its surfaces, and all that was said of it."""
+    file = folder / f"model.{suffix}"
     file.write_text(text, encoding="utf-8")
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -60,10 +64,8 @@ def crowds(draw):
 
 @given(text=crowds())
 def test_pairs_and_parameters_are_those_that_mujoco_computes(text, tmp_path_factory):
-    mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model = compiled(text)
+    data = forward(model)
     scene, said = loaded(text, tmp_path_factory.mktemp("crowd"))
     assert "contact pairs" not in said
     found = {tuple(sorted(each.surfaces)): each.law for _, each in scene.all_contacts()}
@@ -112,7 +114,6 @@ def distance(scene, first, second):
 @given(data=st.data())
 def test_distances_are_those_of_mujoco(kind, data, tmp_path_factory):
     """A ball and a plane meet each shape at MuJoCo's distance: no edge is rounded there."""
-    mujoco = pytest.importorskip("mujoco")
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
     points = " ".join(map(repr, rng.uniform(-0.5, 0.5, 36).tolist()))
     quat = rng.normal(size=4)
@@ -124,9 +125,8 @@ def test_distances_are_those_of_mujoco(kind, data, tmp_path_factory):
         f'<geom name="floor" type="plane" size="1 1 1" pos="0 0 -3"/>{solid(kind, "it", place, "m")}'
         f"{solid('sphere', 'ball', ball, 'm')}</worldbody></mujoco>"
     )
-    model = mujoco.MjModel.from_xml_string(text)
-    state = mujoco.MjData(model)
-    mujoco.mj_forward(model, state)
+    model = compiled(text)
+    state = forward(model)
     scene, _ = loaded(text, tmp_path_factory.mktemp("pair"))
     g = {name: model.geom(name).id for name in ("floor", "it", "ball")}
     apart = mujoco.mj_geomDistance(model, state, g["it"], g["ball"], 10.0, None)
@@ -144,9 +144,7 @@ def test_distances_are_those_of_mujoco(kind, data, tmp_path_factory):
 
 def ring(count, height=0.1):
     """Vertices of a prism with 2 count corners."""
-    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    ends = [np.stack([np.cos(angle), np.sin(angle), 0.0 * angle + z], axis=1) for z in (-height, height)]
-    return " ".join(f"{x:.9g}" for x in np.concatenate(ends).ravel())
+    return " ".join(f"{x:.9g}" for x in prism(count, -height, height).ravel())
 
 
 NOTES = {
@@ -172,7 +170,6 @@ NOTES = {
 
 @pytest.mark.parametrize("kind", NOTES)
 def test_what_is_not_imported_is_said_by_name(kind, tmp_path):
-    pytest.importorskip("mujoco")
     geom, pair, said = NOTES[kind]
     joint = "" if "<joint" in geom else "<freejoint/>"
     text = (
@@ -187,7 +184,6 @@ def test_what_is_not_imported_is_said_by_name(kind, tmp_path):
 
 
 def test_a_converted_mesh_is_the_same_surface(tmp_path):
-    pytest.importorskip("mujoco")
     text = (
         f'<mujoco><asset><mesh name="coin" vertex="{ring(9)}" scale="1 2 3"/></asset><worldbody>'
         '<geom name="floor" type="plane" size="1 1 1"/><body pos="0 0 1"><freejoint/>'

@@ -3,7 +3,6 @@
 from itertools import pairwise
 from xml.sax.saxutils import quoteattr
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.imports.read import read_model
 from ephs.mechanics.shapes.dry import Dry
+from tests.mechanics.imports.by_mujoco import compiled, forward
 from tests.mechanics.imports.models import URDF
 from tests.mechanics.imports.pinocchio_robots import compare, robot
 
@@ -71,10 +71,7 @@ def test_a_spherical_joint_is_mujocos_ball(write, quiet):
     <origin xyz="0 0.2 0" rpy="0.1 0.2 0.3"/></joint>
     </robot>"""
     dynamics = ephs.dynamics(quiet(write(text)))
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    data.qvel[:] = [0.3, -0.2, 0.5]
-    mujoco.mj_forward(model, data)
+    data = forward(compiled(text), rates=[0.3, -0.2, 0.5])
     found = dynamics.acceleration(dynamics.state(rates={"j": data.qvel}))["j"]
     assert np.abs(found - data.qacc).max() < 1e-12
 

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 
 import ephs
 from benchmarks.cases import CASES
-from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.testing import mechanisms
@@ -152,41 +151,8 @@ def test_a_loop_of_prescribed_joints_is_refused_by_name():
         ephs.simulate(scene_of_text(text), 0.1, **TIGHT)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"method": "rk87", "form": "paper"}, "form is 'paper', expected reduced"),
-        ({"method": "rk87", "rtol": -1.0}, "rtol is -1.0"),
-        ({"method": "rk87", "rtol": np.nan}, "rtol is nan"),
-        ({"method": "rk54", "max_step": 0.0}, "max_step is 0.0"),
-        (
-            {"method": "rk45"},
-            "method is 'rk45', expected one of auto, natural, natural4, variational, radau, rk54, rk87, semi, or an ",
-        ),
-    ],
-)
-def test_bad_options_are_named(options, message):
-    with pytest.raises(ephs.OptionError, match=message):
-        ephs.simulate(BY_NAME["tumbling-body"].scene(), 0.1, **options)
-
-
 def test_too_many_steps_end_a_run_and_keep_what_there_is():
     with pytest.raises(ephs.SimulationError, match="more steps than are allowed") as caught:
         ephs.simulate(BY_NAME["heavy-top"].scene(), 2.0, method="rk54", max_steps=20)
     assert len(caught.value.partial) == 21
     assert caught.value.partial.t[-1] == caught.value.time
-
-
-@pytest.mark.parametrize(("name", "scipys"), [("rk54", "RK45"), ("rk87", "DOP853")])
-def test_coefficients_are_those_of_scipy(name, scipys):
-    import scipy.integrate
-
-    method, own = getattr(scipy.integrate, scipys), tableau(name)
-    n = method.n_stages
-    a = own.arrays["a"]
-    assert np.array_equal(a[:n, : method.A.shape[1]], method.A[:n, :n])
-    assert np.array_equal(a[n], method.B)
-    assert np.array_equal(own.c, method.C[:n])
-    estimates = (method.E5, method.E3) if name == "rk87" else (method.E, np.zeros(n + 1))
-    assert np.array_equal(own.arrays["error"], estimates[0])
-    assert np.array_equal(own.arrays["coarse"], estimates[1])

@@ -204,6 +204,12 @@ def test_so_do_those_of_contacts_within_a_mechanism(hug, seed):
     assert list(stage.memory["counts"]) == [6, 3]  # three joints and three contacts
 
 
+def assert_order_three(end, exact, until, counts=(20, 40, 80)):
+    """Errors of ends by so many constant steps."""
+    errors = [largest(end(until / count) - exact) for count in counts]
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
+
+
 def test_steps_converge_with_order_three():
     """Where friction is smooth beside the steps, and nothing touches or parts."""
     with pytest.warns(ephs.SceneWarning):
@@ -216,33 +222,28 @@ def test_steps_converge_with_order_three():
 
     exact = ephs.simulate(hug, 4e-3, method="rk87", rtol=1e-12, atol=1e-14, audit="off")
     exact = np.concatenate([exact.body("hand").velocity[-1], exact.body("trunk").angular_velocity[-1]])
-    errors = [largest(end(4e-3 / count) - exact) for count in (16, 32, 64)]
-    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
+    assert_order_three(end, exact, 4e-3, (16, 32, 64))
 
 
 def test_so_they_do_with_loops_and_prescribed_motions(closed):
-    def end(**how):
-        sol = ephs.simulate(closed, 0.1, audit="off", **how)
+    def end(step=None, **how):
+        sol = ephs.simulate(closed, 0.1, audit="off", step=step, **({"method": "semi"} | how))
         ledgers = [sol.heat[-1], sol.work[-1]]
         return np.concatenate([*(sol.body(body).velocity[-1] for body in closed.bodies), ledgers])
 
-    exact = end(method="rk87", rtol=1e-11, atol=1e-12)
-    errors = [largest(end(method="semi", step=0.1 / count) - exact) for count in (20, 40, 80)]
-    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
+    assert_order_three(end, end(method="rk87", rtol=1e-11, atol=1e-12), 0.1)
 
 
 def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
     scene = shipped("four-bar")
     inputs = {"joints.main": lambda t, state: 4.0 * np.sin(20.0 * t) - 0.1 * state.joints["main"].rate[0]}
 
-    def end(**how):
+    def end(step=None, **how):
         with uncorrected():
-            sol = ephs.simulate(scene, 0.2, inputs=inputs, audit="off", **how)
+            sol = ephs.simulate(scene, 0.2, inputs=inputs, audit="off", step=step, **({"method": "semi"} | how))
         return np.concatenate([*(sol.body(body).velocity[-1] for body in scene.bodies), sol.heat[-1:], sol.work[-1:]])
 
-    exact = end(method="rk87", rtol=1e-11, atol=1e-12)
-    errors = [largest(end(method="semi", step=0.2 / count) - exact) for count in (20, 40, 80)]
-    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.7)
+    assert_order_three(end, end(method="rk87", rtol=1e-11, atol=1e-12), 0.2)
 
 
 def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_changes():

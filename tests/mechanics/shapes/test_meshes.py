@@ -40,6 +40,12 @@ def cube():
     return points[hull.simplices]
 
 
+def prism(count, low, high):
+    """(2 count, 3) corners of a regular prism about z, on a circle of radius 1."""
+    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    return np.concatenate([np.stack([np.cos(angle), np.sin(angle), 0.0 * angle + z], axis=1) for z in (low, high)])
+
+
 def text_stl(triangles):
     corners = "".join(
         "facet normal 0 0 0\nouter loop\n"
@@ -99,9 +105,7 @@ def test_points_are_the_corners_of_a_mesh(tmp_path):
 def test_the_largest_hull_says_how_far_points_are_outside():
     """Corners of a prism on a circle: a chord over k steps of angle h leaves the sagitta 1 − cos(k h / 2) outside."""
     count = 2 * MOST_VERTICES
-    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    ends = [np.stack([np.cos(angle), np.sin(angle), 0.0 * angle + z], axis=1) for z in (-1.0, 1.0)]
-    corners, depth = largest_hull(np.concatenate(ends))
+    corners, depth = largest_hull(prism(count, -1.0, 1.0))
     assert len(corners) == MOST_VERTICES
     steps = np.arccos(1.0 - depth) / (np.pi / count)
     assert steps == pytest.approx(round(steps), abs=1e-6) and 4 <= round(steps) <= 8
@@ -125,13 +129,11 @@ def test_a_coarse_hull_leaves_no_point_farther_outside_than_it_says(count, way, 
 
 @pytest.mark.parametrize("other", ["plane = {}", "sphere = 1.0"])
 def test_a_mesh_with_many_faces_meets_planes_alone(other, tmp_path):
-    angle = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-    ends = [np.stack([np.cos(angle), np.sin(angle), 0.0 * angle + z], axis=1) for z in (2.0, 3.0)]
-    prism = f"shape = {{ points = {np.concatenate(ends).tolist()} }}"
+    shape = f"shape = {{ points = {prism(64, 2.0, 3.0).tolist()} }}"
     file = tmp_path / "scene.toml"
     file.write_text(
         'format = 1\nname = "prism"\n[bodies.b]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.j]\ntype = "free"\n'
-        f'bodies = ["ground", "b"]\nframe1 = {{}}\nframe2 = {{}}\n[surfaces.b]\nbody = "b"\n{prism}\nstiffness = 1e4\n'
+        f'bodies = ["ground", "b"]\nframe1 = {{}}\nframe2 = {{}}\n[surfaces.b]\nbody = "b"\n{shape}\nstiffness = 1e4\n'
         f'[surfaces.g]\nbody = "ground"\nshape = {{ {other} }}\n',
         encoding="utf-8",
     )

@@ -7,9 +7,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import ephs
-from ephs import Pattern
+from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
+from ephs.mechanics import joint, rigid_body
+from ephs.mechanics.elements import components
 from ephs.mechanics.scene.build import initial_state, scene_system
 from tests.scenes import shipped
 
@@ -188,3 +190,44 @@ def _slider_crank(angle):
     mass = 9e-4 + 0.15 * centre @ centre + 2.5e-4 * k**2 + 0.25 * along**2
     slope = 2.0 * (0.15 * centre @ bent + 2.5e-4 * k * dk + 0.25 * along * turned)
     return mass, slope, 9.81 * 0.15 * centre[1], along
+
+
+# ---- wheels on gears ---------------------------------------------------------------------------------------------
+
+WHEEL, GRAVITY = 1.3, 9.81
+
+
+def train(bodies, gears):
+    """Wheels on hinges, each on the ground or on the wheel before; gears tie their rates.
+
+    Parameters
+    ----------
+    bodies
+        (whether it is on the one before, distance of its centre from its hinge).
+    gears
+        (of wheels, ratios): Σ ratio · rate = 0.
+    """
+    hinges = [
+        joint("revolute", [1, 0, 0, 0, 0.2 * k, 0, 0], [1, 0, 0, 0, -away, 0, 0], driven=True)
+        for k, (_, away) in enumerate(bodies)
+    ]
+    port = next(str(p) for p in hinges[0].interface if str(p) not in ("p1", "p2"))
+    of = hinges[0].interface[port].quantity
+    junctions = {"g": junction(Q.body_momentum)}
+    boxes, fillings = {"ground": {"p": "g"}}, {"ground": components.ground()}
+    for k, (carried, _) in enumerate(bodies):
+        junctions |= {f"b{k}": junction(Q.body_momentum), f"p{k}": junction(of)}
+        boxes |= {f"w{k}": {"p": f"b{k}"}, f"h{k}": {"p1": f"b{k - 1}" if carried and k else "g", "p2": f"b{k}"}}
+        boxes[f"h{k}"][port] = f"p{k}"
+        fillings |= {f"w{k}": rigid_body(WHEEL, [0.3, 0.4, 0.5], [0.0, -GRAVITY, 0.0]), f"h{k}": hinges[k]}
+    for number, (wheels, ratios) in enumerate(gears):
+        boxes[f"gear{number}"] = {f"x{i}": f"p{k}" for i, k in enumerate(wheels)}
+        ports = {f"x{i}": of for i in range(len(wheels))}
+        fillings[f"gear{number}"] = ephs.constraint(ports, [list(ratios)], name="gear")
+    system = Pattern(junctions=junctions, boxes=boxes)(**fillings)
+    poses, place = {}, np.zeros(3)
+    for k, (carried, away) in enumerate(bodies):
+        centre = place if carried and k else np.zeros(3)
+        place = centre + np.array([0.2 * k + away, 0.0, 0.0])
+        poses[f"w{k}.pe.q"] = np.array([1.0, 0.0, 0.0, 0.0, *place])
+    return system, poses

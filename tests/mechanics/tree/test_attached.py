@@ -126,7 +126,11 @@ def tied_arm():
     return system, start, {"x": (-1.5, False)}
 
 
-MACHINES = [motor, warm_beam, tied_arm]
+def geared():
+    return machines.train([(False, 0.3), (True, 0.2), (False, 0.1)], [((0, 1, 2), (1.0, -2.0, 0.5))])
+
+
+MACHINES = [motor, warm_beam, tied_arm, geared]
 
 
 @pytest.mark.parametrize("machine", MACHINES)
@@ -145,15 +149,18 @@ def test_derivatives_of_what_is_attached_are_those_of_the_equations(machine):
         assert np.allclose(column, near, rtol=0.0, atol=1e-5 * max(1.0, largest(near)))
 
 
-@pytest.mark.parametrize("machine", MACHINES)
-def test_both_evaluations_are_one(machine):
-    eq = equations_of(*machine())
-    state = eq.start(0.0)
+def assert_dense_rates_agree(eq, state):
     y = eq.vector(state)
     fast, slow = eq.rates(0.0, state.q, y), np.zeros(eq.size)
     assert eq.dense.rates(state.q, y, eq.given, eq.heats, slow) == (0, 0)
     scale = np.maximum(1.0, np.abs(fast[eq.nv :]))
     assert np.all(np.abs(fast[eq.nv :] - slow[eq.nv :]) <= 1e-11 * scale)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_both_evaluations_are_one(machine):
+    eq = equations_of(*machine())
+    assert_dense_rates_agree(eq, eq.start(0.0))
 
 
 # ---- what has no place ----------------------------------------------------------------------------------------------

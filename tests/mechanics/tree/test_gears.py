@@ -10,54 +10,13 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import ephs
-from ephs import Pattern, junction
-from ephs import quantity as Q
-from ephs.mechanics import joint, rigid_body
-from ephs.mechanics.elements import components
-from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.frames import Unplaced
 from tests.mechanics.tree.general import held_to_the_general_form
-from tests.mechanics.tree.test_attached import equations_of
-from tests.numerics import jacobian
+from tests.mechanics.tree.machines import GRAVITY, WHEEL, train
+from tests.mechanics.tree.test_attached import assert_dense_rates_agree, equations_of
 
 UNTIL = 0.5
-MASS, AWAY, GRAVITY, MESHED = 1.3, 0.4, 9.81, 0.7
-
-
-def train(bodies, gears):
-    """Wheels on hinges, each on the ground or on the wheel before; gears tie their rates.
-
-    Parameters
-    ----------
-    bodies
-        (whether it is on the one before, distance of its centre from its hinge).
-    gears
-        (of wheels, ratios): Σ ratio · rate = 0.
-    """
-    hinges = [
-        joint("revolute", [1, 0, 0, 0, 0.2 * k, 0, 0], [1, 0, 0, 0, -away, 0, 0], driven=True)
-        for k, (_, away) in enumerate(bodies)
-    ]
-    port = next(str(p) for p in hinges[0].interface if str(p) not in ("p1", "p2"))
-    of = hinges[0].interface[port].quantity
-    junctions = {"g": junction(Q.body_momentum)}
-    boxes, fillings = {"ground": {"p": "g"}}, {"ground": components.ground()}
-    for k, (carried, _) in enumerate(bodies):
-        junctions |= {f"b{k}": junction(Q.body_momentum), f"p{k}": junction(of)}
-        boxes |= {f"w{k}": {"p": f"b{k}"}, f"h{k}": {"p1": f"b{k - 1}" if carried and k else "g", "p2": f"b{k}"}}
-        boxes[f"h{k}"][port] = f"p{k}"
-        fillings |= {f"w{k}": rigid_body(MASS, [0.3, 0.4, 0.5], [0.0, -GRAVITY, 0.0]), f"h{k}": hinges[k]}
-    for number, (wheels, ratios) in enumerate(gears):
-        boxes[f"gear{number}"] = {f"x{i}": f"p{k}" for i, k in enumerate(wheels)}
-        ports = {f"x{i}": of for i in range(len(wheels))}
-        fillings[f"gear{number}"] = ephs.constraint(ports, [list(ratios)], name="gear")
-    system = Pattern(junctions=junctions, boxes=boxes)(**fillings)
-    poses, place = {}, np.zeros(3)
-    for k, (carried, away) in enumerate(bodies):
-        centre = place if carried and k else np.zeros(3)
-        place = centre + np.array([0.2 * k + away, 0.0, 0.0])
-        poses[f"w{k}.pe.q"] = np.array([1.0, 0.0, 0.0, 0.0, *place])
-    return system, poses
+AWAY, MESHED = 0.4, 0.7
 
 
 @cache
@@ -70,9 +29,9 @@ def pair():
 
 def pair_by_hand():
     """(angle, rate) of the first wheel, whose gear turns the second one twice as fast."""
-    inertia = 0.5 + MASS * AWAY**2 + 4.0 * 0.5
+    inertia = 0.5 + WHEEL * AWAY**2 + 4.0 * 0.5
     run = solve_ivp(
-        lambda t, y: [y[1], -MASS * GRAVITY * AWAY * np.cos(y[0]) / inertia], (0.0, UNTIL), [0.0, 0.0],
+        lambda t, y: [y[1], -WHEEL * GRAVITY * AWAY * np.cos(y[0]) / inertia], (0.0, UNTIL), [0.0, 0.0],
         method="DOP853", rtol=1e-12, atol=1e-13,
     )  # fmt: skip
     return run.y[:, -1]
@@ -119,11 +78,7 @@ def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
     by_joint = eq.layout.by_joint(state.r)
     for wheels, ratios in gears:
         assert abs(sum(g * by_joint[f"h{k}"][0] for k, g in zip(wheels, ratios, strict=True))) <= 1e-12
-    y = eq.vector(state)
-    fast, slow = eq.rates(0.0, state.q, y), np.zeros(eq.size)
-    assert eq.dense.rates(state.q, y, eq.given, eq.heats, slow) == (0, 0)
-    where = slice(eq.nv, eq.nv + eq.n)
-    assert np.allclose(fast[where], slow[where], rtol=1e-10, atol=1e-10)
+    assert_dense_rates_agree(eq, state)
     held_to_the_general_form(eq, eq.problem, state)
 
 
@@ -136,24 +91,6 @@ def test_wheels_out_of_mesh_are_turned_to_where_they_mesh(off):
     found = eq.closed(apart).q
     assert apart.q.tolist() == [0.0, MESHED + off]
     assert abs(found[1] - MESHED - 2.0 * found[0]) <= 1e-12
-
-
-def test_changes_of_geared_motion_are_those_of_the_equations():
-    system, start = train([(False, 0.3), (True, 0.2), (False, 0.1)], [((0, 1, 2), (1.0, -2.0, 0.5))])
-    eq = equations_of(system, start)
-    state, rng = eq.start(0.0), np.random.default_rng(3)
-    linear, r = Linearised(eq), rng.standard_normal(eq.n)
-    s = eq.heats.entropies(state.heats)
-
-    def rates(z):
-        linear.forward(eq.advance(state.q, z[: eq.nv]), z[eq.nv :], s)
-        return eq.dense.rate.copy()
-
-    linear.forward(state.q, r, s)
-    middle = np.concatenate([np.zeros(eq.nv), r])
-    exact = linear.columns(solve=True)[: eq.n, : middle.size]
-    near = jacobian(lambda v: rates(middle + v), middle.size, 1e-5)
-    assert np.all(np.abs(exact - near) <= 1e-8 * np.maximum(1.0, np.abs(near).max(axis=0)))
 
 
 def test_gears_of_a_loop_contradict_each_other_or_repeat():
