@@ -11,15 +11,15 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_600,
     "ephs/exporting": 13_600,
-    "ephs/mechanics": 422_800,
+    "ephs/mechanics": 424_000,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
-    "ephs/semantics": 195_900,
+    "ephs/semantics": 195_800,
     "ephs/show": 64_400,
-    "ephs/solve": 126_100,
+    "ephs/solve": 126_400,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 565_300,
+    "tests": 565_600,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
