@@ -147,9 +147,10 @@ def simulate(
 
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
+        problem = problem_of_scene(model, initial, inputs, start)
         if not initial:
             check_motions(model, start)
-        problem = in_own_units(problem_of_scene(model, initial, inputs, start))
+        problem = in_own_units(problem)
     method_of = METHODS["natural4"] if method == "auto" and form != "reduced" and step is None else None
     chosen_method, reason = (method_of, f"the {form} form") if method_of else chosen(method, problem, step=step)
     _fits(form, chosen_method)
