@@ -94,7 +94,8 @@ def _plain(value: Any) -> Any:
         name = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', type(value).__name__)}"
         return f"{name} {function_digest(value)}"
     if is_dataclass(value):
-        return f"{type(value).__name__} { ({each.name: _plain(getattr(value, each.name)) for each in fields(value)}) }"
+        told = {each.name: _plain(getattr(value, each.name)) for each in fields(value)}
+        return f"{type(value).__name__} {told}"  # a text, as of functions, which tells inputs from numbers
     return type(value).__name__
 
 
