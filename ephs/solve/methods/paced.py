@@ -13,9 +13,12 @@ from ephs.solve.auditing.retaken import PARTS, share_missed
 from ephs.solve.equations.instant import rates_read
 from ephs.solve.equations.model import Model, model_of
 from ephs.solve.equations.starting import check_start
+from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.driven import advance_driven, advance_whole
+from ephs.solve.methods.guesses import BEFORE
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.methods.records import IRREVERSIBLE
+from ephs.solve.methods.starts import unknowns_away
 from ephs.solve.posing.breakpoints import NEAR
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord, record_of
@@ -56,6 +59,8 @@ class Paced:
         self.problem, self.method = problem, make(self._model)
         self.name, self._step = self.method.name, control.step
         self._within: Natural | None = None
+        self._start: PacedState | None = None
+        self._away: PacedState | None = None
         self._iterations = self._cut = 0
         self._rtol, self._atol = control.rtol.rates(d), control.atol.rates(d)
         self._counted = _counted(problem)
@@ -71,7 +76,8 @@ class Paced:
         check_start(self.problem, self.method.model, h)
         x = self.problem.point
         energies = self.method.energies(x)
-        return PacedState(t, self.method.init(x), Row(x, energies, np.zeros(4)))
+        self._start = PacedState(t, self.method.init(x), Row(x, energies, np.zeros(4)))
+        return self._start
 
     def prepare(self, state: PacedState, h: float) -> None:
         """Compile programs that are not in the cache, before timing starts."""
@@ -83,10 +89,11 @@ class Paced:
 
     def chunk(self, state: PacedState, h: float, steps: int) -> tuple[NaturalState, Chunk]:
         """Up to so many steps of h seconds from a state, in compiled calls where inputs are constant."""
-        if self.problem.constant:
-            inner, chunk = advance_whole(self.method, state.inner, h, steps)
-        else:
-            inner, chunk = advance_driven(self.problem, self.method, state.inner, state.t, h)
+        inner, chunk = self._advanced(state, h, steps)
+        if state is self._start and chunk.failure is not None and not chunk.steps:
+            self._away = self._away or self._elsewhere(state)
+            if self._away is not state:
+                inner, chunk = self._advanced(self._away, h, steps)
         self._iterations += chunk.iterations
         self._cut += chunk.cut
         return inner, chunk
@@ -101,6 +108,21 @@ class Paced:
         end, second = self._single(middle, 0.5 * h)
         off, worst = self._off(state, coarse, end)
         return Attempt(state, end, h, off / (2.0**self.method.order - 1.0), min(first, second), middle, worst)
+
+    def _advanced(self, state: PacedState, h: float, steps: int) -> tuple[NaturalState, Chunk]:
+        if self.problem.constant:
+            return advance_whole(self.method, state.inner, h, steps)
+        return advance_driven(self.problem, self.method, state.inner, state.t, h)
+
+    def _elsewhere(self, state: PacedState) -> PacedState:
+        """The same start with unknowns that solve the equations there, where these are found."""
+        model, problem = self._model, self.problem
+        given = model.input_values(None if problem.constant else problem.inputs(state.t, problem.initial))
+        z = unknowns_away(model, Continuous(model), state.inner.x, given)
+        if z is None:
+            return state
+        whole = np.tile(z, (len(state.inner.z), 1))
+        return replace(state, inner=replace(state.inner, z=whole, previous=np.tile(whole, (BEFORE, 1))))
 
     def inside(self, attempt: Attempt[PacedState], t: float) -> PacedState:
         """A shorter step from the same start, or from the middle of two, so that instants lead to the end."""

@@ -23,6 +23,7 @@ from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.methods.settling import LEFT, PUT, TOTAL, Settling
 from ephs.solve.methods.solvers import Solvers
+from ephs.solve.methods.starts import unknowns_away
 from ephs.solve.methods.stores import HeatStores
 from ephs.solve.posing.errors import LARGEST, Outcome, SolveError, worst_entry
 from ephs.solve.posing.problem import NO_STATE, Problem
@@ -141,7 +142,14 @@ class Radau:
         account = self._settling.opened(y) if self._settling.active else np.zeros(0)
         sums, stages = np.zeros(4 + len(d.components)), np.zeros((self.scheme.nodes.size, z.size))
         start = RadauState(t, y.copy(), z, sums, stages, 0.0, account)
-        first, second = (self._solved(start, PROBE * h * part)[1] for part in (1.0, 0.5))
+        try:
+            first, second = self._probed(start, h)
+        except SolveError:
+            away = unknowns_away(self.model, self.equations, y, self.inputs(t, y))
+            if away is None:
+                raise
+            start, self._kept.stale = replace(start, z=away), True
+            first, second = self._probed(start, h)
         allowed = self._allowed(y)
         jumps = [_size(end - y, allowed) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
@@ -152,6 +160,10 @@ class Radau:
         stages = self._solved(start, 0.5 * PROBE * h)[0]
         self._kept.stale = True
         return replace(start, z=values(self.scheme.nodes, 0.0) @ stages)
+
+    def _probed(self, start: RadauState, h: float) -> list[Array]:
+        """The states at the ends of two steps too short to move anything."""
+        return [self._solved(start, PROBE * h * part)[1] for part in (1.0, 0.5)]
 
     def prepare(self, state: RadauState, h: float) -> None:
         """Nothing is left to do: the start has evaluated everything."""

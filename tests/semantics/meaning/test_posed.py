@@ -102,8 +102,6 @@ def test_what_an_irreversible_component_does_is_not_known_before_the_efforts():
     assert not system.relation().at({"k.q": 1.0}).empty
     there = system.relation().at({"k.q": 1.0}, efforts={"d": [-1.0, 0.0]})
     assert there.determined and there.values[Path.parse("k.q")] == pytest.approx(-1.0)
-    sol = ephs.simulate(system, 1.0, initial={"k.q": 1.0}, step=0.01, method="natural4")
-    assert sol["k.q"].ravel()[-1] == pytest.approx(0.25, rel=1e-9)
 
 
 def test_what_nothing_determines_is_named():
