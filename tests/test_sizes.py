@@ -16,10 +16,10 @@ CEILINGS = {
     "ephs/operad": 30_600,
     "ephs/semantics": 195_800,
     "ephs/show": 64_400,
-    "ephs/solve": 126_400,
+    "ephs/solve": 127_200,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 565_600,
+    "tests": 566_200,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
