@@ -17,7 +17,7 @@ from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.bundles.extents import room
 from ephs.semantics.derive.relations import compiled
 from ephs.semantics.primitives.behaviour import NaturalBehaviour, Storing
-from ephs.semantics.primitives.differences import slope
+from ephs.semantics.primitives.differences import slope_within
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage import Signature
@@ -136,7 +136,7 @@ def _storage(storage: Storage, potentials: Mapping[str, float]) -> _Evaluate:
 
         step = v.copy()
         effort[:] = outputs_at(step)
-        hessian[:] = slope(outputs_at, step, _rooms(storage, point)).ravel()
+        hessian[:] = slope_within(outputs_at, step, _rooms(storage, point)).ravel()
         energy[0] = storage.energy(storage.retract(point, step))
 
     return evaluate
@@ -163,7 +163,7 @@ def _relation(primitive: Primitive, potentials: Mapping[str, float]) -> _Evaluat
         out = outputs_at(z)
         flow[:], condition[:] = out[:n], out[n:]
         rooms = np.concatenate([np.maximum(1.0, np.abs(z[: n + k])), _rooms(primitive, point)])
-        jacobian[:] = slope(outputs_at, z, rooms).ravel()
+        jacobian[:] = slope_within(outputs_at, z, rooms).ravel()
 
     return evaluate
 

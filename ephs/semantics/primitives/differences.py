@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.extents import room
+from ephs.semantics.spaces.rank import DIFFERENCE
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives.primitives import Point, Storage
@@ -20,10 +21,20 @@ ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Tolerance of a difference of energies, relative to them and to the rounding of the states times the gradient."""
 
 
-def slope(function: Callable[[Array], Array], at: Array, rooms: Array | None = None) -> Array:
-    """The derivative (m, n) of a function at a point (n,) within rooms (n,), by default of its size; see `settled`."""
-    sizes = np.maximum(1.0, np.abs(at)) if rooms is None else rooms
-    columns = [settled(lambda k, way=way: function(at + k * way), 1.0) / way.sum() for way in np.diag(sizes)]
+def slope(function: Callable[[Array], Array], at: Array) -> Array:
+    """The derivative (m, n) of a function at a point (n,) by central differences; rounding of their terms is zero."""
+    columns: list[Array] = []
+    for i in range(at.size):
+        shift = DIFFERENCE * max(1.0, abs(float(at[i]))) * np.eye(at.size)[i]
+        there, back = function(at + shift), function(at - shift)
+        change, terms = there - back, np.abs(there) + np.abs(back)
+        columns.append(np.where(np.abs(change) > ROUNDING * terms, change, 0.0) / (2.0 * shift[i]))
+    return np.array(columns).T if columns else np.zeros((np.size(function(at)), 0))
+
+
+def slope_within(function: Callable[[Array], Array], at: Array, rooms: Array) -> Array:
+    """The derivative (m, n) of a function at a point (n,), whose numbers vary within rooms (n,); see `settled`."""
+    columns = [settled(lambda k, way=way: function(at + k * way), 1.0) / way.sum() for way in np.diag(rooms)]
     return np.array(columns).T if columns else np.zeros((np.size(function(at)), 0))
 
 
