@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 127_200,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 566_200,
+    "tests": 566_300,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

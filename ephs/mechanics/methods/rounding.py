@@ -1,8 +1,8 @@
-"""Runs whose steps are short because of rounding: their error estimates are that of the rates, whatever the step.
+"""Warning of long runs whose error estimates are rounding of the rates, which shorter steps do not reduce.
 
-Where a light body hangs between heavy ones, its acceleration is a small difference of large forces over a small mass,
-and rounding of the state alone changes it by more than the tolerance leaves to a step. Shorter steps share this error
-among more of them, so a run goes on with ever so many.
+The acceleration of a light body between heavy ones is the difference of two large forces, divided by a small mass.
+Rounding of the state can change it by more than the tolerance of a step. As the tolerance of a step falls with its
+length, the number of steps grows without a gain in accuracy.
 """
 
 import warnings

@@ -124,7 +124,7 @@ def _nothing() -> float:
 def _energy(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """The balance of kinetic + potential + heat − work, and of all energies − work.
 
-    What corrected steps leave, as they can move nothing by it, is an error: it is allowed that of the method.
+    Energy that corrected steps miss and no state can take up is an error of the method, with its tolerance.
     """
     ledgers, left = solution.ledgers, solution.stats.get("plain_defect", {}).get("left", 0.0)
     worst = worst_entry(solution.energy_error)
@@ -302,7 +302,7 @@ LAWS: Mapping[str, AuditLaw] = {
     "energy": AuditLaw(
         "energy changes by heat and work only",
         "largest K + |V − V₀| + |heat| + |work|",
-        f"{LAWFUL:g} where a method's steps are lawful, or corrected, but for what corrections can move nothing by; "
+        f"{LAWFUL:g} where a method's steps are lawful, or corrected, beside energy that no state can take up; "
         f"else {MANY_TIMES:g} rtol (atol where that is 0), "
         f"at least {LEAST:g}; {COARSE:g} at constant steps",
         _energy,
