@@ -8,6 +8,7 @@ import ephs
 from ephs import Pattern, library
 from ephs.solve.equations.heats import Heats
 from ephs.solve.methods.radau import Radau
+from ephs.solve.methods.settling import Settling
 from ephs.solve.posing.errors import Outcome
 from examples import oscillator, physics
 from tests.mechanics.plain import uncorrected
@@ -181,6 +182,32 @@ def test_what_is_prescribed_is_not_moved_with_the_energy(monkeypatch):
     assert missed() <= 8.0 * EPS * 0.3
     monkeypatch.setattr(Radau, "_filtered", lambda self, h, changes: changes)
     assert missed() > 1e-7, "the control"
+
+
+OSCILLATING = "q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)"
+GASES = "s: entropy; v: volume; z: entropy; w: volume; gas(s, v); other(s=z, v=w); wall(s1=s, s2=z)"
+
+
+@pytest.mark.parametrize("step", [0.05, 0.2])
+@pytest.mark.parametrize("energy", [3e2, 3e6, 3e9, 3e11])
+def test_what_entropies_of_large_stores_miss_moves_nothing_beside_them(energy, step, monkeypatch):
+    """Two gases that share a wall, and an oscillator of 0.5 J that nothing couples to them."""
+    parts = {"pe": library.spring(k=1.0), "ke": library.point_mass(m=1.0), "pkc": library.pkc()}
+    gas = library.ideal_gas(c1=energy, c2=energy / 300.0, v0=1.0, c=1.5)
+    gases = {"gas": gas, "other": gas, "wall": library.heat_transfer(h=energy / 600.0)}
+    beside = Pattern.from_text(f"{GASES}; {OSCILLATING}")(**parts, **gases)
+
+    def missed(system, **start):
+        start = {"pe.q": 1.0, **start}
+        sol = ephs.simulate(system, 3.0, initial=start, method="radau", step=step, audit="off")
+        return largest(np.ravel(sol["pe.q"]) - np.cos(sol.t))
+
+    with uncorrected():
+        plain = missed(Pattern.from_text(OSCILLATING)(**parts))
+    volumes = {"gas.v": 1.0, "other.v": 0.5}
+    assert missed(beside, **volumes) <= 1.01 * plain
+    monkeypatch.setattr(Settling, "missed", lambda *_: 0.0)
+    assert missed(beside, **volumes) > 10.0 * plain or step > 0.1, "the control"
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])

@@ -21,7 +21,7 @@ from ephs.solve.methods.energies import EnergyEquations
 from ephs.solve.methods.kept import KeptMatrices
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
-from ephs.solve.methods.settling import LEFT, PUT, TOTAL, Settling
+from ephs.solve.methods.settling import LEFT, MISSED, PUT, TOTAL, Settling
 from ephs.solve.methods.solvers import Solvers
 from ephs.solve.methods.starts import unknowns_away
 from ephs.solve.methods.stores import HeatStores
@@ -82,11 +82,14 @@ class StepTotals:
     passed
         (1 + stages, 2, passages) heat in W and entropy in W/K that is passed at the start, which counts for friction
         alone, and at the stages; none where all heat is conducted.
+    mixed
+        (stages, states) power in W into storages with entropies.
     """
 
     numbers: Array
     powers: Array
     passed: Array | None
+    mixed: Array
 
 
 @final
@@ -212,7 +215,8 @@ class Radau:
 
     def record(self, taken: Instants[RadauState]) -> RunRecord:
         """Records of many instants."""
-        noted = [(state.t, *state.account[[PUT, TOTAL, LEFT]]) for _, state, _ in taken if state.account.size]
+        accounts = [(state.t, state.account) for _, state, _ in taken if state.account.size]
+        noted = [(t, *account[[PUT, TOTAL]], account[LEFT] + account[MISSED]) for t, account in accounts]
         times, *put = np.array(noted).reshape(-1, 4).T
         self._settling.noted.note(times, np.stack(put, axis=1))
         return record_of(taken, [self.row(state) for _, state, _ in taken])
@@ -259,7 +263,8 @@ class Radau:
         if self._passages.called:
             start = [self._known(state)] if self._passages.frictions else found[:1]
             passed = np.array([self._passages.powers(each) for each in (*start, *found)])
-        return StepTotals(ys, np.array([each.sums for each in found]), passed)
+        mixed = np.array([self._settling.powers(each) for each in found])
+        return StepTotals(ys, np.array([each.sums for each in found]), passed, mixed)
 
     def _known(self, state: RadauState) -> AccumulatorRates:
         """Powers and stored energies at a state."""
@@ -300,10 +305,13 @@ class Radau:
             sums[3] += made.sum()
             sums[4:] += made
         if account.size:
-            rest = theta * h * z[: self._rates] - changed
+            rest, missed, mixed = theta * h * z[: self._rates] - changed, 0.0, self._settling.mixed
+            if mixed.size:
+                stored = self._instant(t, y, z).energies[mixed] - self._known(state).energies[mixed]
+                missed = self._settling.missed(weights, totals.mixed, stored)
             y, account, error = self._settling.settled(
                 account, state.y, y, lambda: self._filtered(h, np.array([changed, rest])),
-                self._allowed(state.y, y), float(sums[1]), heat, chosen=self._chosen,
+                self._allowed(state.y, y), float(sums[1]), heat, missed, chosen=self._chosen,
             )  # fmt: skip
         return RadauState(t, y, z, sums, state.stages, 0.0, account), error
 

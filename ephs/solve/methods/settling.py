@@ -1,6 +1,7 @@
 """A step's end moved to the energy that work and heat leave to it, of any system on vector spaces.
 
-The move is that of `ephs.solve.march.storing`; stores of heat are advanced by energy before, see `Passages`.
+The move is that of `ephs.solve.march.storing`; stores of heat are advanced by energy before, see `Passages`. Entropies
+are not moved. What they miss, as those of gases, is left: else a large store would move all that is small beside it.
 """
 
 from collections.abc import Callable
@@ -20,14 +21,16 @@ from ephs.solve.equations.model import Model
 from ephs.solve.march.account import ROUNDING, RunAccount, rounding, worth
 from ephs.solve.march.noted import Noted
 from ephs.solve.march.storing import Missing, Moved, store
+from ephs.solve.methods.continuous import AccumulatorRates
 from ephs.solve.methods.places import Part
-from ephs.solve.methods.records import STORING, Columns, Scratch
+from ephs.solve.methods.records import STORING, Columns, Scratch, efforts_of, rates_of
 from ephs.solve.methods.residuals import FAULTS, called
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.running.snapshot import parts
 
-ANCHOR, LEFT, PUT, TOTAL, HEAT, CARRY = range(6)
-"""Numbers of a state's account: those of `RunAccount`; the heat in J that went to stores of heat, and its rounding."""
+ANCHOR, LEFT, PUT, TOTAL, HEAT, CARRY, MISSED = range(7)
+"""Numbers of a state's account: those of `RunAccount`; the heat in J that went to stores of heat, less what entropies
+missed, and its rounding; what entropies missed."""
 
 
 def _stored_energies(
@@ -120,6 +123,8 @@ class Settling:
     ----------
     active
         Whether there are such storages; where none of their states may be moved, what they miss is left.
+    mixed
+        (storages,) those of them with entropies.
     noted
         What was moved in states that are kept.
     """
@@ -136,6 +141,11 @@ class Settling:
                 environment = isinstance(slot.primitive, Storage) and slot.primitive.environment
                 weights[state.point] = model.reference.intensive(state.quantity) if environment else 0.0
         self.active = bool(counted.size)
+        hot = t.entropy[t.e_index] == 1.0
+        self.mixed = counted[[bool(hot[t.e_at[i] : t.e_at[i] + t.dims[i, 0]].any()) for i in counted.tolist()]]
+        self._rates, efforts = rates_of(t, self.mixed), efforts_of(t, self.mixed)
+        self._efforts, self._intensive = int(t.counts[0]) + efforts, t.intensive[efforts]
+        self._thermal, self._owners = t.entropy[efforts], np.repeat(np.arange(self.mixed.size), t.dims[self.mixed, 0])
         tables = replace(model.only(counted).tables, address=model.resting(counted)[counted])
         self._account = RunAccount.table(1)
         self._states, self._start, self._along, self._beside, trial, self._allowed = np.zeros((6, d.point_size))
@@ -156,13 +166,37 @@ class Settling:
         a: Any = self._account[0]
         self._states[:], a.anchor = x, 0.0
         self._refuse(self._settled(0.0, 0.0, 0))
-        account = np.zeros(CARRY + 1)
+        account = np.zeros(MISSED + 1)
         account[ANCHOR] = -a.rest
         return account
 
+    def powers(self, found: AccumulatorRates) -> Array:
+        """Power in W into each state of the storages with entropies, at an instant."""
+        return (found.unknowns[self._efforts] + self._intensive) * found.unknowns[self._rates]
+
+    def missed(self, weights: Array, powers: Array, change: Array) -> float:
+        """Energy in J by which entropies miss what passed in a step.
+
+        What a storage misses is shared by how much passed through each of its states.
+
+        Parameters
+        ----------
+        weights
+            (stages,) in s.
+        powers
+            (stages, states of storages with entropies) in W.
+        change
+            (storages with entropies,) of their energies in J.
+        """
+        passed = np.bincount(self._owners, weights @ powers, self.mixed.size)
+        sizes = abs(weights).max() * abs(powers).sum(axis=0)
+        whole = np.bincount(self._owners, sizes, self.mixed.size)
+        thermal = np.bincount(self._owners, sizes * self._thermal, self.mixed.size)
+        return float((change - passed) @ (thermal / np.maximum(whole, TINY)))
+
     def settled(
         self, account: Array, start: Array, x: Array, directions: Callable[[], Array], allowed: Array, work: float,
-        heat: float, *, chosen: bool,
+        heat: float, missed: float, *, chosen: bool,
     ) -> tuple[Array, Array, float]:  # fmt: skip
         """The end x of a step moved to its energy, the account after it, and the step's error by that in tolerances.
 
@@ -176,6 +210,8 @@ class Settling:
             (states,) what errors may be.
         work, heat
             Work in J since the start of the run; heat in J that went to stores of heat in the step.
+        missed
+            Energy in J that entropies missed in the step, which nothing else makes up for.
         chosen
             Whether steps are chosen: then states are moved by no more than `MOST` of what is allowed.
 
@@ -185,7 +221,7 @@ class Settling:
             A storage cannot be evaluated there.
         """
         a: Any = self._account[0]
-        taken, carry = grown(float(account[HEAT]), float(account[CARRY]), heat)
+        taken, carry = grown(float(account[HEAT]), float(account[CARRY]), heat - missed)
         (a.anchor, a.left), a.chosen, a.moved, a.size = account[: LEFT + 1].tolist(), int(chosen), 0.0, 0.0
         self._states[:] = x
         self._refuse(self._settled(work, taken, 0))
@@ -194,7 +230,8 @@ class Settling:
             self._along[:], self._beside[:] = directions() * self._free
             self._refuse(self._settled(work, taken, 1))
         put, total = account[PUT] + a.moved, account[TOTAL] + abs(a.moved)
-        return self._states.copy(), np.array([a.anchor, a.rest, put, total, taken, carry]), float(a.size)
+        kept = np.array([a.anchor, a.rest, put, total, taken, carry, account[MISSED] - missed])
+        return self._states.copy(), kept, float(a.size)
 
     def _refuse(self, fault: int) -> None:
         if fault:
