@@ -72,6 +72,7 @@ class Touching:
         self._points: list[_ImpactPoint] = []
         self._stops: list[_Stop] = []
         self._cut = False
+        self._seen: tuple[Array, Array, tuple[Array, Array]] | None = None
         for i, edge in enumerate(reduced.edges):
             if edge.friction < 0:
                 continue
@@ -117,7 +118,12 @@ class Touching:
         return out
 
     def motion(self, q: Array, r: Array) -> tuple[Array, Array]:
-        """(points + stops,) gaps in m and their rates in m/s, or in rad and rad/s."""
+        """(points + stops,) gaps in m and their rates in m/s, or in rad and rad/s; of the same state at once."""
+        if self._seen is None or self._seen[0] is not q or self._seen[1] is not r:
+            self._seen = q, r, self._motion(q, r)
+        return self._seen[2]
+
+    def _motion(self, q: Array, r: Array) -> tuple[Array, Array]:
         relative, residual = self._relative(q, r), self._eq.dense.residual
         twists = np.array([residual.twist(i) for i in range(self._eq.reduced.links)] + [np.zeros(6)]).T
         (first, near), (second, far) = self._ends
