@@ -36,6 +36,20 @@ inertia = [1.0, 2.0, 3.0]
 angular_velocity = {fast}
 rotation = {{ rpy = [0.3, 0.2, 0.1] }}
 """
+WELDED = TOPS.replace("name =", "assembly.adjust = true\nname =").format(slow=[0, 0.3, 3], fast=[0.2, 0, 9]) + "".join(
+    f"""
+[bodies.{top}_tip]
+mass = 0.5
+inertia = [0.1, 0.1, 0.1]
+position = [0.5, 0.0, 0.0]
+[joints.{top}_weld]
+type = "fixed"
+bodies = ["{top}", "{top}_tip"]
+at = [0.2, 0.0, 0.0]
+"""
+    for top in ("slow", "fast")
+)
+"""Each part has a fixed joint, whose friction stands still."""
 RUNS = {
     "coils in one room": (coils(lib.environment()), {"initial": START, "method": "radau"}),
     "coils in one room, natural": (coils(lib.environment()), {"initial": START, "method": "natural", "rtol": 1e-8}),
@@ -43,6 +57,7 @@ RUNS = {
     "scene 9": (scene_of_text(toml(drawn(9))), {"method": "rk87"}),
     "scene 33": (scene_of_text(toml(drawn(33))), {"method": "rk54"}),
     "scene 38": (scene_of_text(toml(drawn(38))), {"method": "radau"}),
+    "welded tops": (scene_of_text(WELDED), {"method": "rk87"}),
 }
 
 

@@ -54,7 +54,8 @@ def factors_of(
     prescribed
         Its outer ports whose effort is.
     counts
-        Whether what stores a quantity is a part for itself; what stores nothing of the kind goes with the first part.
+        Whether what stores a quantity is a part for itself; what stores nothing of the kind goes with a part that is
+        on its junctions, as the friction of a fixed joint does, else with the first one.
     """
     key = "factors", prescribed, counts
     return once(descriptor, key, lambda: tuple(_factors(descriptor, prescribed, counts)))
@@ -69,10 +70,11 @@ def _factors(descriptor: Descriptor, prescribed: frozenset[Path], counts: Callab
     parts = list(dict.fromkeys(wires.label[stored].tolist()))
     if len(parts) < 2:
         return [Factor(descriptor, numbers, np.arange(descriptor.point_size))]
+    label = wires.joined(parts)
     sizes, paths = n.sizes(n.states), list(flat.fillings)
     at, found = starts(sizes), list[Factor]()
     for part in parts:
-        mine = wires.beside(wires.label == part if found else ~np.isin(wires.label, parts[1:]))
+        mine = wires.beside(label == part if found else ~np.isin(label, parts[1:]))
         states = np.flatnonzero(mine[wires.storing])
         system = _restricted(flat, [paths[i] for i in np.flatnonzero(mine).tolist()])
         found.append(Factor(system.descriptor(), numbers[mine], spans(at[states], sizes[states])))
@@ -101,6 +103,18 @@ class _Wires:
     storing: Index
     holds: Mask
     label: Index
+
+    def joined(self, parts: list[int]) -> Index:
+        """(components,) numbers of sets where others are joined to one of the parts that are on their junctions."""
+        own = self.label[self.owner]
+        counted = np.isin(own, parts)
+        there = np.full(self.junction.max(initial=-1) + 1, -1)
+        ends = counted & ~self.holds[self.owner]
+        there[self.junction[ends]] = own[ends]
+        met = ~counted & ~self.holds[self.owner] & (there[self.junction] >= 0)
+        to = np.arange(self.label.max(initial=-1) + 1)
+        to[own[met]] = there[self.junction[met]]
+        return to[self.label]
 
     def beside(self, part: Mask) -> Mask:
         """(components,) whether each belongs to a part, or prescribes an effort in it."""
