@@ -112,7 +112,7 @@ class _Wires:
         ends = counted & ~self.holds[self.owner]
         there[self.junction[ends]] = own[ends]
         met = ~counted & ~self.holds[self.owner] & (there[self.junction] >= 0)
-        to = np.arange(self.label.max(initial=-1) + 1)
+        to = np.arange(int(self.label.max(initial=-1)) + 1, dtype=np.int64)
         to[own[met]] = there[self.junction[met]]
         return to[self.label]
 
