@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern
+from ephs import Path, Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
+from ephs.solve.auditing.passing import passed_over
 from ephs.solve.equations.oscillations import oscillations
 from tests.numerics import largest
 from tests.solve.conftest import oscillator
@@ -100,6 +101,39 @@ def test_what_hardly_swings_is_at_rest(stiffness, method, step):
     sol = ephs.simulate(pendulum(stiffness), 1.0, method=method, step=step)
     assert not sol.audit.findings
     assert largest(sol.joint("pin").coordinate) <= 2.0 * 9.81 * 0.5 / stiffness * (1.0 + 1e-6)
+
+
+CARRIED = Pattern.from_text(
+    "q: displacement; x: displacement; p: momentum; p1: momentum; p2: momentum; hold(q); first(p); turn(q, p);"
+    "pe(q=x); pkc(q=x, p=p1); second(p=p2); apart(a=p1, b=p, c=p2)"
+)
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+@pytest.mark.parametrize("stiffness", [5e3, 2e4])
+def test_a_stiff_spring_that_carries_something_along_is_stretched_without_oscillating(stiffness, method):
+    """Two masses of 1 kg on springs of 1 N/m and k, in their slow oscillation.
+
+    The control has the stiff spring compressed by as much, which is an oscillation.
+    """
+    square = 0.5 * (1.0 + 2.0 * stiffness - np.sqrt(1.0 + 4.0 * stiffness**2))
+    stretch = square / (stiffness - square)
+    apart = ephs.constraint({"a": Q.momentum, "b": Q.momentum, "c": Q.momentum}, [[1.0, 1.0, -1.0]])
+    system = CARRIED(
+        hold=lib.spring(k=1.0), first=lib.point_mass(m=1.0), turn=lib.pkc(), pe=lib.spring(k=stiffness),
+        pkc=lib.pkc(), second=lib.point_mass(m=1.0), apart=apart,
+    )  # fmt: skip
+
+    static = stiffness * stretch**2  # of the spring, relative to the largest energy, which is that of 1 N/m
+    sizes: dict[float, float] = {}
+    for first in (stretch, -stretch):
+        start = {"hold.q": 1.0, "pe.q": first}
+        sol = ephs.simulate(system, 2.0, initial=start, method=method, step=0.2, audit="off")
+        found = passed_over(sol, 0.2, 0.0)
+        assert found is not None and found.path == Path.of("pe")
+        sizes[first] = found.size / static
+    assert sizes[stretch] < 0.01
+    assert sizes[-stretch] > 1.0, "the control"
 
 
 @pytest.mark.parametrize("by_hand", [False, True], ids=["scene", "system"])

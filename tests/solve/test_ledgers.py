@@ -111,6 +111,25 @@ def test_a_prescribed_velocity_needs_the_force_of_newton():
         sol.port("q")
 
 
+@pytest.mark.parametrize("method", ["radau", "natural4"])
+@pytest.mark.parametrize("bend", [0.0, 2.0])
+def test_efforts_that_only_balances_determine_are_read_with_their_power(bend, method):
+    """A coil without inductance: a current goes through a magnet and a conductor of 3 (1 + bend u²) u A at u V."""
+    current, constant = 5.0, 2.0
+    ports = {"b": quantity.flux_linkage, "s": quantity.entropy}
+    motor = Pattern.from_text("b: flux_linkage, exposed; p: momentum; s: entropy; g(b, p); r(b, s); ke(p); room(s)")(
+        g=ephs.gyrator({"b": quantity.flux_linkage, "p": quantity.momentum},
+                       [[0.0, -constant], [constant, 0.0]], external_field=True),
+        r=ephs.irreversible(ports, lambda b, s: 3.0 * (1.0 + bend * b * b) * np.array([[s, -b], [-b, b * b / s]])),
+        ke=library.point_mass(m=1.0), room=library.environment(),
+    )  # fmt: skip
+    sol = ephs.simulate(motor, 1.0, initial={"ke.p": 1.0}, inputs={"b": {"flow": current}}, method=method)
+    effort, rate = sol.port("b").effort[:, 0], np.ravel(sol["ke.p"])
+    conducted = 3.0 * (1.0 + bend * effort**2) * effort
+    assert largest(conducted - (current + constant * rate)) <= 1e-11 * largest(conducted)
+    assert np.array_equal(sol.port("b").power, effort * current)
+
+
 def test_the_defect_of_steps_is_no_supply():
     """Nothing reaches a falling brake from outside; what steps that damp lose of its energy is their defect."""
     sol = ephs.simulate(pendulum(6.0, "friction = 2.0"), 1.0, method="variational", step=0.02)

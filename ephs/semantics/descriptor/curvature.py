@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.descriptor.kernel_table import OK, address_of, prototype
-from ephs.semantics.primitives.primitives import Point, Reversible, Storage
+from ephs.semantics.primitives.primitives import Irreversible, Point, Reversible, Storage
 from ephs.semantics.spaces import manifold
 
 
@@ -39,8 +39,16 @@ def turned(process: Reversible, x: Point, efforts: Array, rates: Array, referenc
     return 2.0 * jacobian[: (n + k) * (n + k + m)].reshape(n + k, -1)[n:, n + k :] @ rates
 
 
+def flow_slopes(process: Irreversible, x: Point, efforts: Array, reference: Reference) -> Array:
+    """(n, n) derivatives of the flows by the efforts. Exact of recorded structures, else by differences; no numbers
+    outside of the domain.
+    """
+    n, m = efforts.size, sum(manifold(process.interface[port].quantity.space).dim for port in process.reads)
+    return _written(process, x, efforts, 0, reference)[2][: n * (n + m)].reshape(n, n + m)[:, :n]
+
+
 def _written(
-    primitive: Storage | Reversible, x: Point, efforts: Array, k: int, reference: Reference | None
+    primitive: Storage | Reversible | Irreversible, x: Point, efforts: Array, k: int, reference: Reference | None
 ) -> tuple[Array, Array, Array]:
     """Efforts, flows and derivatives of a relation; NaN outside of its domain."""
     given = reference or Reference()

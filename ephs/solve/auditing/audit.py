@@ -188,7 +188,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
 
 
 def _passed(solution: "Solution", h: float, bounds: Bounds) -> Iterator[Breach]:
-    if (found := passed_over(solution, h)) is not None:
+    if (found := passed_over(solution, h, bounds.accuracy)) is not None:
         yield Breach(found.size, _nothing, found.instant, found.path, found.hint(bounds.step))
 
 

@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.operad import Path
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.curvature import curvature
 from ephs.solve.auditing.resolution import STILL
 from ephs.solve.auditing.rounding import trembling
+from ephs.solve.equations.instant import instant, rates_read
 from ephs.solve.equations.oscillations import oscillations
+from ephs.solve.posing.problem import Problem
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -50,23 +53,40 @@ class Passed:
         return f" of {told}" if step else f", or max_step = {told}"
 
 
-def passed_over(solution: "Solution", h: float) -> Passed | None:
-    """Oscillations that steps of h s pass over, with energy before and after them; None where there are none."""
+def passed_over(solution: "Solution", h: float, allowed: float) -> Passed | None:
+    """Oscillations that steps of h s pass over, with energy before and after them; None where there are none.
+
+    Where that is more than is allowed, as a part of the gross energies, the whole balances of momenta are asked.
+    """
     problem = solution.problem
     if problem is None or len(solution) < 2 or not _may_be(solution, h):
         return None
     worst: Passed | None = None
     scale = max(solution.ledgers.scale, trembling(solution) / STILL)  # what is less counts as at rest
     for i in np.unique(np.linspace(0, len(solution) - 2, PLACES).astype(int)).tolist():
-        both = [oscillations(problem, problem.descriptor.pack(solution.state_at(k))) for k in (i, i + 1)]
-        held = [(of, np.where(of.rates * h > TURNED, of.energies, 0.0)) for of in both if of is not None]
-        if len(held) < len(both):
-            return None
-        of, energies = min(held, key=lambda each: float(each[1].sum()))
-        size, most = float(energies.sum()) / scale, int(np.argmax(energies))
+        for pulls in (lambda _: None, lambda k: _pull(solution, problem, k)):
+            both = [oscillations(problem, problem.descriptor.pack(solution.state_at(k)), pulls(k)) for k in (i, i + 1)]
+            held = [(of, np.where(of.rates * h > TURNED, of.energies, 0.0)) for of in both if of is not None]
+            if len(held) < len(both):
+                return None
+            of, energies = min(held, key=lambda each: float(each[1].sum()))
+            size, most = float(energies.sum()) / scale, int(np.argmax(energies))
+            if not size > allowed:
+                break
         if size > (worst.size if worst is not None else 0.0):
             worst = Passed(size, i + 1, of.springs[most], float(of.rates[most]))
     return worst
+
+
+def _pull(solution: "Solution", problem: Problem, i: int) -> Array:
+    """(effort_size,) rates of momenta at the i-th instant, in N or N m; of other states, too."""
+    d, state = problem.descriptor, solution.state_at(i)
+    x = d.pack(state)
+    found = instant(d, problem.reference, x, problem.inputs(float(solution.t[i]), state)).rates
+    rates, out = np.concatenate([found[slot.path] for slot in d.states]), np.zeros(d.effort_size)
+    for slot, _ in d.storages:
+        out[list(slot.efforts)] = rates[rates_read(slot)]
+    return out
 
 
 def _may_be(solution: "Solution", h: float) -> bool:

@@ -12,12 +12,17 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.descriptor.curvature import curvature, turned
+from ephs.semantics.descriptor.curvature import curvature, flow_slopes, turned
 from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Irreversible, Reversible
 from ephs.semantics.spaces.decompositions import least_squares, svd
-from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
+from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, SPANNED, rank_of
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import Outcome, SolveError
+
+ROUNDS, SETTLED = 50, 1e-12
+"""Iterations for efforts that balances determine, and their relative change at which these end."""
 
 
 @final
@@ -110,7 +115,7 @@ def instant(
     given = d.complete_inputs(inputs)
     stored = stored_efforts(d, reference, x)
     constraint = constraints_of(d, x)
-    efforts = _all_efforts(d, constraint, stored, given)
+    efforts = _all_efforts(d, reference, x, constraint, stored, given)
     flows = _flows(d, reference, x, efforts)
     n_w, n_e, n_l = d.rate_size, d.effort_size, d.multiplier_size
     driven = [slot for slot in d.outer if given[slot.path].effort]
@@ -140,7 +145,8 @@ def instant(
     differentiated[:, rise] = constraint
     turning = -_turned_constraints(d, reference, x, efforts, _known_rates(d, constraint, flows))
     matrix = np.vstack([balance, growth, differentiated, held])
-    scale = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)
+    scale = np.abs(matrix).max(axis=1, initial=0.0)
+    scale[scale == 0.0] = 1.0  # flows that are balanced by efforts alone
     everything = np.concatenate([right, np.zeros(n_w), turning, lift])
     solution, free = _least_norm(matrix / scale[:, None], everything / scale)
     outer = {slot.path: given[slot.path].value for slot in d.outer}
@@ -192,19 +198,56 @@ def stored_efforts(d: Descriptor, reference: Reference, x: Array) -> dict[int, f
     return out
 
 
-def _all_efforts(d: Descriptor, constraint: Array, stored: dict[int, float], given: Mapping[Path, Input]) -> Array:
-    """Efforts that storages give or inputs prescribe, and the others from the constraints."""
-    known = dict(stored)
+def _all_efforts(
+    d: Descriptor,
+    reference: Reference,
+    x: Array,
+    constraint: Array,
+    stored: dict[int, float],
+    given: Mapping[Path, Input],
+) -> Array:
+    """Efforts that storages give or inputs prescribe, and the others from the constraints and balances.
+
+    Raises
+    ------
+    SolveError
+        Newton's method does not find them.
+    """
+    known, supplied = dict(stored), np.zeros(d.effort_size)
     for slot in d.outer:
         if given[slot.path].effort:
             known |= dict(zip(range(slot.at, slot.at + slot.quantity.space.dim), given[slot.path].value, strict=True))
+        else:
+            supplied[slot.efforts] += given[slot.path].value
     out = np.zeros(d.effort_size)
     places = np.array(sorted(known), dtype=int)
     out[places] = [known[int(i)] for i in places]
     others = np.setdiff1d(np.arange(d.effort_size), places)
-    if others.size and constraint.size:
-        out[others] = least_squares(constraint[:, others], -constraint[:, places] @ out[places], part=ELIMINATION)
+    if others.size:
+        _balance(d, reference, x, constraint, out, others, supplied)
     return out
+
+
+def _balance(
+    d: Descriptor, reference: Reference, x: Array, constraint: Array, efforts: Array, others: Index, supplied: Array
+) -> None:
+    """Find the efforts that nothing stores: constraints hold, and flows into their junctions are balanced."""
+    count, multipliers = others.size, np.zeros(len(constraint))
+    matrix = np.zeros((count + len(constraint), count + len(constraint)))
+    matrix[:count, count:], matrix[count:, :count] = constraint[:, others].T, constraint[:, others]
+    for _ in range(ROUNDS):
+        missed = _flows(d, reference, x, efforts) + constraint.T @ multipliers - supplied
+        matrix[:count, :count] = _flow_slopes(d, reference, x, efforts)[np.ix_(others, others)]
+        scale = np.abs(matrix).max(axis=1)
+        scale[scale == 0.0] = 1.0
+        right = np.concatenate([missed[others], constraint @ efforts]) / scale
+        step = least_squares(matrix / scale[:, None], -right, part=ELIMINATION)
+        efforts[others] += step[:count]
+        multipliers += step[count:]
+        if np.abs(step[:count]).max() <= SETTLED * np.abs(efforts).max():
+            return
+    junction = next(slot for slot in d.junctions if others[0] in range(slot.efforts.start, slot.efforts.stop))
+    raise SolveError(Outcome.DIVERGED, str(junction.path), "efforts that nothing stores, by the balance of flows")
 
 
 def _flows(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Array:
@@ -217,6 +260,18 @@ def _flows(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Arr
             np.add.at(out, list(slot.efforts), slot.primitive.flow(point, e, reference))
         elif isinstance(slot.primitive, Reversible):
             np.add.at(out, list(slot.efforts), slot.primitive.structure(point)[0] @ e)
+    return out
+
+
+def _flow_slopes(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Array:
+    """(effort_size, effort_size) derivatives of these sums by the efforts."""
+    out = np.zeros((d.effort_size, d.effort_size))
+    for slot in d.components:
+        at, point = np.array(slot.efforts, dtype=int), d.point(slot, x)
+        if isinstance(slot.primitive, Irreversible):
+            np.add.at(out, np.ix_(at, at), flow_slopes(slot.primitive, point, efforts[at], reference))
+        elif isinstance(slot.primitive, Reversible):
+            np.add.at(out, np.ix_(at, at), slot.primitive.structure(point)[0])
     return out
 
 

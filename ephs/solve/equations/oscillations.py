@@ -57,8 +57,12 @@ def fastest_of(problem: Problem, x: Array) -> tuple[float, Path] | None:
     return (float(found.rates[-1]), found.springs[-1]) if found is not None and found.rates[-1] > 0.0 else None
 
 
-def oscillations(problem: Problem, x: Array) -> Oscillations | None:
-    """The oscillations about the states x (point_size,); None where nothing oscillates, or there is too much."""
+def oscillations(problem: Problem, x: Array, pull: Array | None = None) -> Oscillations | None:
+    """The oscillations about the states x (point_size,); None where nothing oscillates, or there is too much.
+
+    Springs that losses hold back, or that move on slowly with all else, are stretched without oscillating: with the
+    rates of momenta ``pull`` (effort_size,) in N or N m, energies are no more than these say.
+    """
     d = problem.descriptor
     moving = np.zeros(d.effort_size, dtype=bool)
     for slot in d.junctions:
@@ -83,6 +87,8 @@ def oscillations(problem: Problem, x: Array) -> Oscillations | None:
     efforts = stored_efforts(d, problem.reference, x)
     known = np.array([efforts.get(i, 0.0) for i in range(d.effort_size)])
     push = np.sum([rates[at].T @ known[at] for _, at, _ in springs], axis=0) @ modes
+    if pull is not None:
+        push = np.minimum(np.abs(push), np.abs((span @ modes).T @ pull))
     speed = (span @ modes).T @ inertia @ np.where(moving, known, 0.0)
     omega = np.sqrt(np.maximum(squares, 0.0))
     stiffest = np.argmax([np.sum(modes * (part @ modes), axis=0) for part in parts], axis=0)
