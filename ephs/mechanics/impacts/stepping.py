@@ -20,6 +20,7 @@ from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.parting import closing_part, stopping_parts
 from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.tableaux import MIDPOINT
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -183,9 +184,12 @@ class Impacts(ReducedMethod):
 
     def _booked(self, start: ReducedState, end: ReducedState, which: Index, heat: Array, work: float) -> ReducedState:
         """End of the step with heat of contacts and work in its accumulators."""
-        flows = np.zeros(len(self.equations.reduced.made))
+        eq = self.equations
+        flows = np.zeros(len(eq.reduced.made))
         np.add.at(flows, self._touching.makers[which], heat)
-        return self.equations.booking.step(start, end, flows, work, missed=np.zeros(flows.size))
+        warmed, still = eq.heats.taken(start.heats, flows)[0], np.zeros(eq.nv + eq.n)
+        rates = np.concatenate([still, warmed, [heat.sum(), work, 0.0], flows])
+        return eq.accounts.summed(start, end, MIDPOINT, rates[None], 1.0)
 
     # ---- between impacts ---------------------------------------------------------------------------------------
 

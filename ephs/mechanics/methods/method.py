@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
+from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.semantics.bundles.bundle import Array
+from ephs.solve.equations.heats import held_between
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.result.record import RunRecord
 from ephs.solve.running.control import Control
@@ -61,6 +63,7 @@ class ReducedMethod(ABC):
         self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
         self.counts: dict[str, Any] = {}
         self._known: tuple[Array, Array] | None = None
+        self._low: Attempt[ReducedState] | None = None  # the last part of a step
 
     def first(self, state: ReducedState, y: Array) -> Array:
         """The rates at a state with the vector y, evaluated once where steps from there are tried again."""
@@ -90,9 +93,37 @@ class ReducedMethod(ABC):
         """None: one step a call."""
         return None
 
+    def tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
+        """One step of h seconds, whose detail are its sums, those of `ephs.solve.march.memory.Totals`.
+
+        ``part``: whether it is a part of one, whose sums lie between those of a shorter part and of the whole.
+        """
+        return self.step(state, h)
+
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
-        """A shorter step from the same start, or several where that fails or errs: dense output of full order."""
-        return self._part(attempt.start, t - attempt.start.t, HALVINGS)
+        """A shorter step from the same start, or several where that fails or errs: dense output of full order.
+
+        Where a method has `tried`, heat and the entropies that components made are between those of the instant before
+        and those of the whole step.
+        """
+        start, h, low = attempt.start, t - attempt.start.t, self._low
+        if attempt.detail is None:
+            return self._part(start, h, HALVINGS)
+        if low is None or low.start is not start or abs(low.h) > abs(h):
+            low = Attempt(start, start, 0.0, 0.0, 0.0, 0.0 * attempt.detail)
+        totals = self.equations.engine.totals
+        totals["whole"][:], totals["low"][:] = attempt.detail, low.detail
+        try:
+            found = self.tried(start, h, part=True)
+        except SolveError:
+            return self._part(start, h, HALVINGS)
+        if found.error > 1.0 and self.control.step is None:
+            return self._part(start, h, HALVINGS)
+        made, *bounds = (each.end.totals[TOTALS:] - start.totals[TOTALS:] for each in (found, low, attempt))
+        made = start.totals[TOTALS:] + held_between(made, *bounds)
+        end = replace(found.end, totals=np.concatenate([found.end.totals[:TOTALS], made]))
+        self._low = replace(found, end=end)
+        return end
 
     def _part(self, state: ReducedState, h: float, halvings: int) -> ReducedState:
         found = None

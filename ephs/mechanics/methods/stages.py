@@ -102,7 +102,9 @@ class Stages:
         self.heat = slice(equations.nv + equations.n, self.jacobian.size)
 
     def solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
-        """Increments (stages, size) of (v, r, heats), rates of the totals, and whether the iteration was fast.
+        """Increments (stages, size) of (v, r, heats), rates of all numbers, and whether the iteration was fast.
+
+        States that are not booked as heat have the rates that lead to their increments.
 
         Raises
         ------
@@ -163,7 +165,9 @@ class Stages:
 
         found = iterate(PLAIN, correct, self.enough, self.rough, self._fast)
         if found.solved:
-            return stages, rates[:, eq.nv + eq.n + eq.ns :], bool(found.fast)
+            plain = eq.nv + eq.n + np.flatnonzero(eq.heats.plain)
+            rates[:, plain] = self.inverse @ stages[:, plain] / h
+            return stages, rates, bool(found.fast)
         path, what = counted(eq.reduced, worst_entry(worst))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 

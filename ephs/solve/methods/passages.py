@@ -45,7 +45,6 @@ class Passages:
             tuple(d.components[number].path for number in stores.components.tolist()),
             np.where(stores.hot, stores.components, -1), lambda: (stores.c1, stores.c2),
             np.stack([np.full(at.size, -1), at], axis=1), np.flatnonzero(frictions), model.reference.temperature,
-            np.arange(at.size),
         )  # fmt: skip
         self._rest = (t.kind == STORING).astype(float)
         self._rest[stores.components] = 0.0

@@ -152,11 +152,12 @@ def _cold_outside(on: Evaluator, tables: Tables, node: Integer) -> Real:
 def count(
     on: Evaluator, tables: Tables, work: Work, before: Vector, change: Vector, size: Vector | None,
     stages: StageRates | None = None,
-) -> None:  # fmt: skip
+) -> Integer:  # fmt: skip
     """Put what components made in a step in place of what they passed on, in the changes of (heats, totals, flows).
 
-    Mean temperatures of the step are ΔE/Δs: so entropies change by what is made. See
-    `ephs.solve.equations.heats.Heats.taken`, also for what stages say of each component's part.
+    Mean temperatures of the step are ΔE/Δs: so entropies change by what is made, to rounding. By them each component's
+    part is of order two in the step. Stages say each to the order of the method; what that misses in the sum is shared
+    in proportion. The status returned is that of a store from which more heat was carried away than there is.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def count(
         Sums of the sizes of what the changes add up; those of flows become rounding of what was made.
     """
     cold, nodes, parts = work.temperature, tables.node.size, work.spare
-    rest, whole = on.variable(0.0), on.variable(0.0)
+    rest, whole, status = on.variable(0.0), on.variable(0.0), on.counter(0)
 
     def node(k: Integer) -> None:
         row = tables.node[k]
@@ -176,7 +177,13 @@ def count(
 
         def inside() -> None:
             held = row.c1 + before[k]
-            cold[k] = _log_ratio(on, change[k] / held) * row.c2 / held
+            share = change[k] / held
+
+            def refuse() -> None:
+                status.value, work.fault[0] = TEMPERATURE, row.component
+
+            cold[k] = _log_ratio(on, share) * row.c2 / held
+            on.when(on.negate(share > -1.0), refuse)
 
         on.when(row.component < 0, outside, inside)
 
@@ -249,6 +256,7 @@ def count(
     if stages is not None:
         on.when(on.absolute(rest.value) < TRUSTED * whole.value, share_all)
     on.loop(tables.sink.size, gather)
+    return status.value
 
 
 def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sign: Real) -> Integer:
