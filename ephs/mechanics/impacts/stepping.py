@@ -94,9 +94,7 @@ class Impacts(ReducedMethod):
     def start(self, t: float, h: float) -> ReducedState:
         """The initial state; speeds count by the mechanism's own, a fall's or that of the start."""
         state = self.equations.accounts.opened(self._inner.start(t, h))
-        eq = self.equations
-        accelerations = eq.rates(state.t, state.q, eq.vector(state))[eq.nv : eq.nv + eq.n]
-        self._speed = self._touching.speed(state.q, state.r, accelerations)
+        self._speed = self._touching.speed(state.q, state.r, self.equations.accelerations(state))
         gaps = self._touching.gaps(state.q, state.r)
         deep = int(np.argmin(gaps))
         if gaps[deep] < -self._closed:

@@ -336,8 +336,6 @@ class March:
         """Go on from a snapshot."""
         for name, array in self._taken():
             array[:] = snapshot[name]
-        if self._kept is not None:
-            self._kept.resume()
 
     @property
     def counts(self) -> Counts:

@@ -57,13 +57,13 @@ class ReducedMethod(ABC):
     hold: float = 1.0
     stiffness: float = 0.0
     rough: tuple[Array, ...] = ()
+    _low: Attempt[ReducedState] | None = None  # the last part of a step
 
     def __init__(self, equations: ReducedEquations, control: Control) -> None:
         self.equations, self.control = equations, control
         self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
         self.counts: dict[str, Any] = {}
         self._known: tuple[Array, Array] | None = None
-        self._low: Attempt[ReducedState] | None = None  # the last part of a step
 
     def first(self, state: ReducedState, y: Array) -> Array:
         """The rates at a state with the vector y, evaluated once where steps from there are tried again."""

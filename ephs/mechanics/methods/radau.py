@@ -84,7 +84,7 @@ class Implicit(ReducedMethod):
         eq, state = self.equations, self.equations.accounts.opened(state)
         y0 = eq.vector(state)
         first = self.first(state, y0)
-        stages, rates, fast = self._stages.solve(state, y0, h)
+        stages, rates = self._stages.solve(state, y0, h)
         y1 = y0.copy()
         y1[: stages.shape[1]] += stages[-1]
         end = eq.ended(state, y1, state.t + h)
@@ -93,7 +93,7 @@ class Implicit(ReducedMethod):
         closed = eq.accounts.summed(state, closed, self._tableau, np.vstack([first, rates]), h, part=part, damped=True)
         sums = np.array(eq.engine.totals["low" if part else "whole"])
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
-        self._stages.keep(fast=fast)
+        self._stages.keep()
         return Attempt(state, closed, h, max(error, missed), eq.least(state, closed), sums)
 
     def many(

@@ -3,7 +3,7 @@
 **Energies.** A storage of heat is advanced by the energy that it takes up, E = c1 (exp(s/c2) − 1); its entropy
 follows, with it the mean temperature θ̄ = ΔE/Δs of the step. With it components make flow · (1/θ̄ at the sink − 1/θ̄ at
 the source), so entropies change by what all make, to rounding, and friction never makes less than nothing. Of this sum
-each has the part that the temperatures at the method's stages say, see `Heats.taken`.
+each has the part that the temperatures at the method's stages say.
 
 **Friction.** The heat H of a step is a quadrature of powers, which says nothing of a motion that decays in the step.
 There D = E⁰ + W − E¹ of all that is not heat is right, where Radau IIA finds a hundredth of it at hλ = 2000 and the
@@ -27,14 +27,8 @@ from ephs.solve.posing.errors import Outcome, SolveError
 
 EXPONENTIAL = 1e-12
 """Relative tolerance for recognising an exponential energy law: rounding of the functions."""
-LITTLE = 0.1
-"""Part of a step's heat by which it may be less than a quadrature finds, where the motion gained that energy: moving
-rates instead would leave the slow motion of what friction holds."""
 LINEAR = 1e-8
 """Change of a temperature, relative, below which a series is taken: its square is below rounding."""
-TRUSTED = 0.5
-"""Part of what stages say that components made by which it may differ from the entropy of the stores: a step beyond
-that has other errors."""
 PLAIN = -2
 """In place of a component: a state of an attachment, which is integrated directly and not as energy."""
 
@@ -73,8 +67,6 @@ class Heats:
         c1 in J and c2 in J/K of these storages, as they are at present.
     ends
         (flows, 2) the entropies where a flow comes from and where it goes, −1 where there is none.
-    frictions
-        (frictions,) the flows that are heat of friction.
     theta
         Temperature of the environment in K.
     """
@@ -85,13 +77,11 @@ class Heats:
         components: Index,
         laws: Callable[[], tuple[Array, Array]],
         ends: Index,
-        frictions: Index,
         theta: float,
     ) -> None:
         self._paths, self._components, self._present, self._theta = paths, components, laws, theta
         self._nodes, self.plain = components >= 0, components == PLAIN
         self._booked, self._units = bool(np.any(self._nodes)), np.where(self.plain, 1.0, theta)
-        self.frictions = frictions
         self._source, self._sink = ends.T
         self._loose = np.where(np.all(ends < 0, axis=1), 1.0, 0.0)
 
@@ -147,27 +137,6 @@ class Heats:
         return entropies * np.where(
             self._source >= 0, _end_values(theta, self._source), _end_values(theta, self._sink) + self._loose
         )
-
-    def booked(self, flows: Array, missed: Array | None, lost: float | None) -> Array:
-        """Flows of a step with friction's heat moved towards the energy that the motion lost.
-
-        Parameters
-        ----------
-        flows, missed
-            (makers,) in J by a quadrature, and its differences to an embedded one; None where there is no friction.
-        lost
-            E⁰ + W − E¹ in J; None where the work is what the energies say.
-        """
-        if lost is None or missed is None:
-            return flows
-        out, k = flows.copy(), self.frictions
-        short = lost - float(flows[k].sum())
-        made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not concealed
-        room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), made)
-        whole = float(room.sum())
-        if whole > 0.0:
-            out[k] = np.maximum(flows[k] - made, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
-        return out
 
     def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
         """Changes of energies in J by the flows of a step, those of other states not at all; and (flows,) the entropy

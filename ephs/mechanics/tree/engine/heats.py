@@ -6,11 +6,17 @@ from typing import final
 from ephs.mechanics.tree.sweeps.acting import TOTALS, Tables, Work
 from ephs.semantics.descriptor.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector
-from ephs.solve.equations.heats import LITTLE, PLAIN, TRUSTED
+from ephs.solve.equations.heats import PLAIN
 from ephs.solve.march.records import TableauRecord
 
 ROUNDING = 100.0 * 2.220446049250313e-16
 """Part of what a sum of flows adds up by which it may be off: 10 κ ε with a condition κ of 10."""
+LITTLE = 0.1
+"""Part of a step's heat by which it may be less than a quadrature finds, where the motion gained that energy: moving
+rates instead would leave the slow motion of what friction holds."""
+TRUSTED = 0.5
+"""Part of what stages say that components made by which it may differ from the entropy of the stores: a step beyond
+that has other errors."""
 
 
 def _log_ratio(on: Evaluator, x: Real) -> Real:
@@ -281,7 +287,7 @@ def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sig
 def absorb(on: Evaluator, tables: Tables, lost: Real, change: Vector) -> None:
     """Make the heat of friction in a step's changes what the motion lost in J.
 
-    See `ephs.solve.equations.heats.Heats.booked`.
+    It is shared by what each component made: see `ephs.solve.equations.heats`.
     """
     nodes, whole = tables.node.size, on.variable(0.0)
 
