@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
-from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.equations.heats import held_between
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.result.record import RunRecord
 from ephs.solve.running.control import Control
@@ -119,11 +117,8 @@ class ReducedMethod(ABC):
             return self._part(start, h, HALVINGS)
         if found.error > 1.0 and self.control.step is None:
             return self._part(start, h, HALVINGS)
-        made, *bounds = (each.end.totals[TOTALS:] - start.totals[TOTALS:] for each in (found, low, attempt))
-        made = start.totals[TOTALS:] + held_between(made, *bounds)
-        end = replace(found.end, totals=np.concatenate([found.end.totals[:TOTALS], made]))
-        self._low = replace(found, end=end)
-        return end
+        self._low = found
+        return found.end
 
     def _part(self, state: ReducedState, h: float, halvings: int) -> ReducedState:
         found = None

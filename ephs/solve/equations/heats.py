@@ -164,19 +164,6 @@ class Heats:
         return change, flows * (_end_values(cold, self._sink) - _end_values(cold, self._source) + self._loose)
 
 
-def held_between(made: Array, low: Array, high: Array) -> Array:
-    """Entropies (components,) made in a part of a step, with their sum, each between those of a shorter part and of the
-    whole, if their sums allow that."""
-    held = np.clip(made, np.minimum(low, high), np.maximum(low, high))
-    rest = float((made - held).sum())
-    room = (high if rest * float((high - low).sum()) > 0.0 else low) - held
-    whole = float(room.sum())
-    share = rest / whole if whole else np.inf
-    if rest == 0.0:
-        return held
-    return held + room * share if 0.0 < share <= 1.0 else made
-
-
 def _end_values(values: Array, ends: Index) -> Array:
     """(..., ends) values of the entropies at ends of flows, zero where there is none."""
     return np.where(ends < 0, 0.0, values[..., ends]) if values.shape[-1] else np.zeros((*values.shape[:-1], ends.size))

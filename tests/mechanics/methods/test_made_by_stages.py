@@ -15,6 +15,7 @@ from ephs.mechanics.sensitivity.family import ParameterFamily
 from ephs.mechanics.tree.equations.accounts import Accounts
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.sweeps.acting import TOTALS
+from ephs.solve.posing.errors import SolveError
 from tests.mechanics.methods.test_heat import arms
 from tests.numerics import EPS, largest
 from tests.scenes import shipped
@@ -152,6 +153,19 @@ def test_a_step_with_derivatives_makes_what_a_step_makes(method, inputs):
     d = 1e-4  # errors of the difference: d² and ε / d
     slopes = (run(1.0 + d) - run(1.0 - d)) / (2.0 * d * capacity)
     assert np.all(np.abs(point.y[0][-expected.size :] - slopes) <= 1e-6 * np.abs(slopes))
+
+
+def test_a_step_that_takes_more_heat_from_a_store_than_there_is_says_so():
+    """Three quarters of it leave a temperature; five quarters do not, and the store is named."""
+    eq = ReducedEquations(problem_of_scene(shipped("hot-brake")), 0.0)
+    start = eq.start(0.0)
+    rates = np.zeros((1, eq.size))
+    rates[0, eq.nv + eq.n] = -0.75 * DISC * 293.15
+    eq.accounts.booked(start, MIDPOINT, rates, 1.0, eq.vector(start))
+    rates *= 5.0 / 3.0
+    with pytest.raises(SolveError, match="temperature") as refused:
+        eq.accounts.booked(start, MIDPOINT, rates, 1.0, eq.vector(start))
+    assert refused.value.path == "thermal.disc"
 
 
 def test_stages_share_what_they_miss_and_a_step_beyond_that_takes_means():

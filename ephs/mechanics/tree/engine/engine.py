@@ -52,6 +52,7 @@ class Engine:
         summed = size - self._r.size - work["still"].size
         self._held, self._heats = np.zeros(3), np.zeros(work["entropy"].size)
         self.totals = {name: np.zeros(summed) for name in members(Totals)} | {"start": self._start, "end": self._y}
+        self.totals |= {name: np.zeros(2 * summed) for name in ("whole", "low")}
         self._counted = 2 * self._r.size + work["entropy"].size
         self._account, self._allowed = RunAccount.table(1), np.zeros(self._counted)
         self._stages: dict[int, tuple[dict[str, Array], Table[MarchControl], Array, Array, Bound]] = {}

@@ -328,12 +328,19 @@ def warm(on: Evaluator, tables: Tables, before: Vector, heats: Vector) -> None:
     on.loop(tables.node.size, each_node)
 
 
-def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vector) -> None:
+def hold(
+    on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vector, *, made: bool
+) -> None:  # fmt: skip
     """Put the flows of a part of a step between those of a shorter part and those of the whole, and heats with them.
 
-    So heat does not fall from instant to instant within a step. All are changes of (heats, totals, flows).
+    So heat does not fall from instant to instant within a step. All are changes of (heats, totals, flows); with
+    ``made`` what components made is in place of flows, and nothing else moves.
     """
     nodes = tables.node.size
+    if made:
+        first = nodes + TOTALS
+        held_between(on, *(each.part(first, each.size - first) for each in (change, low, high)))
+        return
 
     def clamped(maker: Integer) -> Real:
         at = nodes + TOTALS + maker
@@ -359,3 +366,32 @@ def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vecto
 
     on.loop(tables.sink.size, friction)
     on.loop(tables.conduction.size, conduction)
+
+
+def held_between(on: Evaluator, made: Vector, low: Vector, high: Vector) -> None:
+    """Put entropies made in a part of a step, with their sum, each between those of a shorter part and of the whole.
+
+    They stay where their sums do not allow that.
+    """
+    rest, grown, above, below = (on.variable(0.0) for _ in range(4))
+
+    def kept(j: Integer) -> Real:
+        return on.minimum(on.maximum(made[j], on.minimum(low[j], high[j])), on.maximum(low[j], high[j]))
+
+    def weigh(j: Integer) -> None:
+        held = kept(j)
+        rest.value, grown.value = rest.value + (made[j] - held), grown.value + (high[j] - low[j])
+        above.value, below.value = above.value + (high[j] - held), below.value + (low[j] - held)
+
+    on.loop(made.size, weigh)
+    up = rest.value * grown.value > 0.0
+    room = on.select(up, above.value, below.value)
+    still = on.negate(on.absolute(rest.value) > 0.0)
+    share = on.select(still, 0.0, rest.value / on.select(on.absolute(room) > 0.0, room, 1.0))
+    allowed = on.either(still, on.both(on.absolute(room) > 0.0, on.both(share > 0.0, share <= 1.0)))
+
+    def place(j: Integer) -> None:
+        held = kept(j)
+        made[j] = held + share * (on.select(up, high[j], low[j]) - held)
+
+    on.when(allowed, lambda: on.loop(made.size, place))

@@ -271,8 +271,8 @@ class Mechanism(Motion):
         ns = self.tables.node.size
         warm(on, self.tables, y0.part(self.summed, ns), y.part(self.summed, ns))
 
-    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
-        hold(on, self.tables, change, low, high)
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector, *, made: bool) -> None:
+        hold(on, self.tables, change, low, high, made=made)
 
     def correct(
         self, on: Evaluator, account: RunAccount, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector,

@@ -193,9 +193,7 @@ class ReducedEquations:
 
     def moved(self, q: Array, change: Array) -> Array:
         """q·exp(change), the change given for the tree's joints; cut ones stay."""
-        v = np.zeros(self.nv)
-        v[: self.n] = change
-        return self.advance(q, v)
+        return self.advance(q, np.concatenate([change, np.zeros(self.nv - self.n)]))
 
     # ---- closing loops -----------------------------------------------------------------------------------------
 
@@ -385,8 +383,7 @@ class ReducedEquations:
         state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(self.summed)))
         self.led.start(lambda: self.row(state).energies)
         state = self.accounts.opened(state)
-        entropies = self.heats.entropies(state.heats)
-        self._paper.check(state.q, state.r, entropies, lambda: self.accelerations(state))
+        self._paper.check(state.q, state.r, self.heats.entropies(state.heats), lambda: self.accelerations(state))
         if self.careful:
             self._without_repeated(state)
         return state
