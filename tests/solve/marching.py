@@ -42,7 +42,7 @@ class Plain(Motion):
     def warm(self, on: Evaluator, y0: Vector, y: Vector) -> None:
         """There is no heat."""
 
-    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector, *, made: bool) -> None:
         """There are no sums."""
 
     def open(self, on: Evaluator, account: RunAccount, q: Vector, y: Vector) -> Integer:

@@ -212,7 +212,7 @@ class Conducting(Pendulum):
     def rounding(self, on, anchor, y):
         return self.parameters[1]
 
-    def hold(self, on, change, low, high):
+    def hold(self, on, change, low, high, *, made):
         change[0] = on.maximum(low[0], on.minimum(high[0], change[0]))
 
 
@@ -232,7 +232,7 @@ def test_a_flow_both_ways_that_goes_back_by_less_than_rounding_is_none(method, c
             increments=1,
         )  # fmt: skip
         for name in ("carry", "carry1", "carry2", "change", "size", "whole", "low"):
-            run.arrays[name] = np.zeros(1)
+            run.arrays[name] = np.zeros(2 if name in ("whole", "low") else 1)
         assert run.advance(2) is Ending.DONE
         assert run.arrays["y"][2] == pytest.approx((0.5 - centre) * counts, abs=1e-14)
 

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import ephs
 from ephs import Pattern, library
-from ephs.solve.equations.heats import Heats
+from ephs.solve.methods import passages
 from ephs.solve.methods.radau import Radau
 from ephs.solve.methods.settling import Settling
 from ephs.solve.posing.errors import Outcome
@@ -283,7 +283,7 @@ def test_a_brake_put_together_by_hand_makes_heat_of_all_that_it_takes(friction, 
 
 def test_without_the_energy_the_quadrature_misses_it(monkeypatch):
     """The control."""
-    monkeypatch.setattr(Heats, "booked", lambda self, flows, missed, lost: flows)
+    monkeypatch.setattr(passages, "heat_of_friction", lambda flows, *_: flows)
     assert stopped(1e6, step=0.002).summary()["heat"] < 100.0
 
 

@@ -197,8 +197,7 @@ class Dynamics:
             if self.cut or self.loading:
                 found = self._linear.forward(q, r, s)
             else:
-                eq = self._equations
-                found = eq.rates(0.0, q, eq.vector(self._reduced(state)))[eq.nv : eq.nv + eq.n]
+                found = self._equations.accelerations(self._reduced(state))
         by_name = forces is None or isinstance(forces, Mapping)
         return self.layout.by_joint(found) if by_name else found[: self.layout.n]
 

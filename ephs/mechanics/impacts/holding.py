@@ -49,11 +49,9 @@ class Holding:
         slips: Array, may: NDArray[np.bool_],
     ) -> None:  # fmt: skip
         self._eq, self._touching = equations, touching
-        eq = equations
         self._seen: list[tuple[float, Array]] = []
         self._on, self._which, self._axes = np.zeros(3 * held.size, dtype=bool), held, axes
-        rates = eq.rates(state.t, state.q, eq.vector(state))[eq.nv : eq.nv + eq.n]
-        mobility, _, free = self._met(state.q, state.r, rates)
+        mobility, _, free = self._met(state.q, state.r, equations.accelerations(state))
         friction = [touching.laws[i].friction for i in held]
         force = impulses(mobility, free + slips / (AT_ONCE * h), friction)
         if force is not None:

@@ -20,6 +20,7 @@ from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.parting import closing_part, stopping_parts
 from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.tableaux import MIDPOINT
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -93,9 +94,7 @@ class Impacts(ReducedMethod):
     def start(self, t: float, h: float) -> ReducedState:
         """The initial state; speeds count by the mechanism's own, a fall's or that of the start."""
         state = self.equations.accounts.opened(self._inner.start(t, h))
-        eq = self.equations
-        accelerations = eq.rates(state.t, state.q, eq.vector(state))[eq.nv : eq.nv + eq.n]
-        self._speed = self._touching.speed(state.q, state.r, accelerations)
+        self._speed = self._touching.speed(state.q, state.r, self.equations.accelerations(state))
         gaps = self._touching.gaps(state.q, state.r)
         deep = int(np.argmin(gaps))
         if gaps[deep] < -self._closed:
@@ -183,9 +182,12 @@ class Impacts(ReducedMethod):
 
     def _booked(self, start: ReducedState, end: ReducedState, which: Index, heat: Array, work: float) -> ReducedState:
         """End of the step with heat of contacts and work in its accumulators."""
-        flows = np.zeros(len(self.equations.reduced.made))
+        eq = self.equations
+        flows = np.zeros(len(eq.reduced.made))
         np.add.at(flows, self._touching.makers[which], heat)
-        return self.equations.booking.step(start, end, flows, work, missed=np.zeros(flows.size))
+        warmed, still = eq.heats.taken(start.heats, flows)[0], np.zeros(eq.nv + eq.n)
+        rates = np.concatenate([still, warmed, [heat.sum(), work, 0.0], flows])
+        return eq.accounts.summed(start, end, MIDPOINT, rates[None], 1.0)
 
     # ---- between impacts ---------------------------------------------------------------------------------------
 

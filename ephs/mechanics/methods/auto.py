@@ -124,6 +124,10 @@ class Auto(ReducedMethod):
                 self._switch(found.end.t, h, f"h·|λ| = {near.stiff:.1f} holds its steps")
         return found
 
+    def tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
+        """A step, or a part of one, of the method whose steps are taken."""
+        return self._active.tried(state, h, part=part)
+
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
         """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones while they pay."""
         self._forward(span.until >= span.t0)

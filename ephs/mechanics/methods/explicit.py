@@ -19,7 +19,6 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.solve.march.account import WHOLE, WORTH
 from ephs.solve.march.steps import STEPS
 from ephs.solve.methods.own import Method, coefficients_of
-from ephs.solve.posing.errors import SolveError
 from ephs.solve.running.control import Control
 from ephs.solve.running.snapshot import Snapshot
 from ephs.solve.running.stepping import Attempt, Leg, Span
@@ -96,7 +95,6 @@ class Explicit(ReducedMethod):
         self.lagged = lagged
         self.method, self.name, self.exponent = method, method.name, method.exponent
         self.share, self._worth = (0.5, WORTH) if lagged is None else (0.0, WHOLE)
-        self._low: tuple[ReducedState, float, Array] | None = None
         compiled = STEPS.compiled()
         self._fine, self._coarse, self._allowed = np.zeros((3, self.atol.size))
         self._open, self._shut = np.zeros((2, equations.n))
@@ -106,23 +104,10 @@ class Explicit(ReducedMethod):
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
-        return self._tried(state, h, part=False)
+        return self.tried(state, h, part=False)
 
-    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
-        """A shorter step from the same start, in which heat is between none and that of the whole."""
-        totals, start = self.equations.engine.totals, attempt.start
-        after = self._low is not None and self._low[0] is start and abs(t - start.t) >= abs(self._low[1] - start.t)
-        totals["whole"][:], totals["low"][:] = attempt.detail, self._low[2] if self._low and after else 0.0
-        try:
-            found = self._tried(start, t - start.t, part=True)
-        except SolveError:
-            found = None
-        if found is None or (found.error > 1.0 and self.control.step is None):
-            return super().inside(attempt, t)
-        self._low = start, t, found.detail
-        return found.end
-
-    def _tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
+    def tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
+        """One step, or a part of one."""
         eq, scheme = self.equations, self.method.arrays
         state = eq.accounts.opened(state)
         y0, y1 = eq.vector(state), np.empty(eq.size)
@@ -131,7 +116,8 @@ class Explicit(ReducedMethod):
             k[0] = self.first(state, y0)
         before = self.solve(state, scheme, self.method.c, h, y0, k, y1)
         allowed = self._allowed[:] = self.atol + self.rtol * eq.sizes(y0, y1)
-        y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part, damped=self.lagged is not None)
+        damped = None if self.lagged is None else eq.advance(state.q, y1[: eq.nv])
+        y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part, damped=damped)
         sums = np.array(eq.engine.totals["low" if part else "whole"])
         end = replace(eq.ended(state, y1, state.t + h), account=account)
         closed = eq.closed(end)

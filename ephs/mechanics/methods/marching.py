@@ -88,7 +88,8 @@ class March:
             "k": (stages, size), "q1": (q.size,), "y1": (size,), "q2": (q.size,), "y2": (size,), "k2": (stages, size),
             "last": (size,), "allowed": (counted,), "open": (eq.n,), "fine": (counted,), "coarse": (counted,),
             "rows_t": (rows, 4), "rows_q": (rows, q.size), "rows_y": (rows, size - eq.nv),
-            **dict.fromkeys(("carry1", "carry2", "change", "size", "whole", "low"), (summed,)),
+            **dict.fromkeys(("carry1", "carry2", "change", "size"), (summed,)),
+            **dict.fromkeys(("whole", "low"), (2 * summed,)),
         }  # fmt: skip
         self.memory = {name: np.zeros(shape) for name, shape in shapes.items()} | {
             "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
@@ -336,8 +337,6 @@ class March:
         """Go on from a snapshot."""
         for name, array in self._taken():
             array[:] = snapshot[name]
-        if self._kept is not None:
-            self._kept.resume()
 
     @property
     def counts(self) -> Counts:

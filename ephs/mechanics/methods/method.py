@@ -55,6 +55,7 @@ class ReducedMethod(ABC):
     hold: float = 1.0
     stiffness: float = 0.0
     rough: tuple[Array, ...] = ()
+    _low: Attempt[ReducedState] | None = None  # the last part of a step
 
     def __init__(self, equations: ReducedEquations, control: Control) -> None:
         self.equations, self.control = equations, control
@@ -90,9 +91,34 @@ class ReducedMethod(ABC):
         """None: one step a call."""
         return None
 
+    def tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
+        """One step of h seconds, whose detail are its sums, those of `ephs.solve.march.memory.Totals`.
+
+        ``part``: whether it is a part of one, whose sums lie between those of a shorter part and of the whole.
+        """
+        return self.step(state, h)
+
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
-        """A shorter step from the same start, or several where that fails or errs: dense output of full order."""
-        return self._part(attempt.start, t - attempt.start.t, HALVINGS)
+        """A shorter step from the same start, or several where that fails or errs: dense output of full order.
+
+        Where a method has `tried`, heat and the entropies that components made are between those of the instant before
+        and those of the whole step.
+        """
+        start, h, low = attempt.start, t - attempt.start.t, self._low
+        if attempt.detail is None:
+            return self._part(start, h, HALVINGS)
+        if low is None or low.start is not start or abs(low.h) > abs(h):
+            low = Attempt(start, start, 0.0, 0.0, 0.0, 0.0 * attempt.detail)
+        totals = self.equations.engine.totals
+        totals["whole"][:], totals["low"][:] = attempt.detail, low.detail
+        try:
+            found = self.tried(start, h, part=True)
+        except SolveError:
+            return self._part(start, h, HALVINGS)
+        if found.error > 1.0 and self.control.step is None:
+            return self._part(start, h, HALVINGS)
+        self._low = found
+        return found.end
 
     def _part(self, state: ReducedState, h: float, halvings: int) -> ReducedState:
         found = None

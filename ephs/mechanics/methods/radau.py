@@ -16,7 +16,6 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import KeptJacobian, Stages, scheme_of
 from ephs.mechanics.methods.tableaux import arrays
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
-from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.methods.collocation import Collocation, radau
 from ephs.solve.posing.errors import Outcome, SolveError
@@ -55,45 +54,47 @@ class Implicit(ReducedMethod):
         self._fewer: Implicit | None = None
         self.exponent = self.scheme.nodes.size + 1.0
         self._embedded = self.scheme.defect @ np.linalg.inv(self.scheme.coefficients) / self.scheme.gamma
-        self._stages = Stages(equations, control, self.scheme, self.counts)
+        self._stages, self._tableau = Stages(equations, control, self.scheme, self.counts), tableau(self.scheme)
         self.rtol, self.atol = self._stages.rtol, self._stages.atol
         self.hold = HELD if self._stages.jacobian.sparse else 1.0
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
-        """One step of h seconds: of three stages, where constraints lose rank and more have no solution.
+        """One step of h seconds."""
+        return self.tried(state, h, part=False)
+
+    def tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
+        """One step, or a part of one: of three stages, where constraints lose rank and more have no solution.
 
         There, rounding is more than what stages of a higher order may be off by.
         """
         try:
-            return self._step(state, h)
+            return self._step(state, h, part=part)
         except SolveError as error:
             few = self.scheme.nodes.size <= FEWEST or not self.equations.engine.looped
             if few or error.outcome is not Outcome.DIVERGED:
                 raise
-        return self._with_fewer().step(state, h)
+        return self._with_fewer().tried(state, h, part=part)
 
     def _with_fewer(self) -> "Implicit":
         """The method of three stages."""
         self._fewer = self._fewer or Implicit(self.equations, self.control, self.counts, radau(FEWEST))
         return self._fewer
 
-    def _step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
-        eq = self.equations
+    def _step(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
+        eq, state = self.equations, self.equations.accounts.opened(state)
         y0 = eq.vector(state)
         first = self.first(state, y0)
-        stages, passed, fast = self._stages.solve(state, y0, h)
+        stages, rates = self._stages.solve(state, y0, h)
         y1 = y0.copy()
         y1[: stages.shape[1]] += stages[-1]
-        end = eq.state(state, y1, state.t + h)
+        end = eq.ended(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
-        weights, allowed = h * self.scheme.coefficients[-1], self._stages.allowed(y0, y1)
-        energies = state.heats + stages[:, self._stages.heat]
-        (_, work, heat), flows = np.split(weights @ passed, [TOTALS])
-        work += closed.totals[1] - state.totals[1]  # that of following motions
-        closed = eq.booking.step(state, closed, flows, work, heat, stages=(weights, energies, passed[:, TOTALS:]))
+        allowed = self._stages.allowed(y0, y1)
+        closed = eq.accounts.summed(state, closed, self._tableau, np.vstack([first, rates]), h, part=part, damped=True)
+        sums = np.array(eq.engine.totals["low" if part else "whole"])
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
-        self._stages.keep(fast=fast)
-        return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))
+        self._stages.keep()
+        return Attempt(state, closed, h, max(error, missed), eq.least(state, closed), sums)
 
     def many(
         self, span: Span[ReducedState], contest: Contest | None = None, left: Leave | None = None
@@ -103,7 +104,7 @@ class Implicit(ReducedMethod):
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
         if looped or attached or not eq.constant or self._stages.jacobian.sparse:
             return None
-        return March(self, tableau(self.scheme), span, left=left, kept=KeptJacobian(self._stages), contest=contest)
+        return March(self, self._tableau, span, left=left, kept=KeptJacobian(self._stages), contest=contest)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised, of fewer stages, too."""

@@ -101,8 +101,10 @@ class Stages:
         self._fast = PATIENT if self.jacobian.sparse else FAST
         self.heat = slice(equations.nv + equations.n, self.jacobian.size)
 
-    def solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
-        """Increments (stages, size) of (v, r, heats), rates of the totals, and whether the iteration was fast.
+    def solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array]:
+        """Increments (stages, size) of (v, r, heats), and rates of all numbers.
+
+        States that are not booked as heat have the rates that lead to their increments.
 
         Raises
         ------
@@ -112,9 +114,9 @@ class Stages:
         self.kept.stale = self.kept.stale or self.jacobian.holding is not self.equations.holding
         return self.kept.solved(state, lambda: self._solve(state, y0, h))
 
-    def keep(self, *, fast: bool) -> None:
-        """Renew the matrix at the next step's start, if convergence was slow or constraints have rotated."""
-        self.kept.stale = not fast or self._turned()
+    def keep(self) -> None:
+        """Renew the matrix at the next step's start, if constraints have rotated."""
+        self.kept.stale = self.kept.stale or self._turned()
 
     def allowed(self, y0: Array, y1: Array) -> Array:
         """Error allowances of a step, for the counted components."""
@@ -140,7 +142,7 @@ class Stages:
             return matrix.solver(length)
         return dense(np.eye(len(matrix)) / length - matrix, _singular)
 
-    def _solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
+    def _solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array]:
         eq, size, count = self.equations, self.jacobian.size, self.scheme.nodes.size
         stages, rates = np.zeros((count, size)), np.zeros((count, eq.size))
         coldest = eq.heats.coldest(y0[self.heat])  # an iterate may overshoot, a solution is not below
@@ -163,7 +165,10 @@ class Stages:
 
         found = iterate(PLAIN, correct, self.enough, self.rough, self._fast)
         if found.solved:
-            return stages, rates[:, eq.nv + eq.n + eq.ns :], bool(found.fast)
+            plain = eq.nv + eq.n + np.flatnonzero(eq.heats.plain)
+            rates[:, plain] = self.inverse @ stages[:, plain] / h
+            self.kept.stale = not found.fast
+            return stages, rates
         path, what = counted(eq.reduced, worst_entry(worst))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 
@@ -180,7 +185,7 @@ class KeptJacobian:
 
     def __init__(self, stages: Stages) -> None:
         eq, m, scheme = stages.equations, stages.jacobian.size, stages.scheme
-        self._stages, self._counted = stages, [0, 0]
+        self._stages = stages
         # In these coordinates the inverse is (Re μ, −Im μ; Im μ, Re μ) on the pair of each of its eigenvalues μ.
         out = np.ascontiguousarray(_parts(scheme.back.T, -1.0).T)
         count, systems = scheme.nodes.size, len(scheme.values)
@@ -219,20 +224,16 @@ class KeptJacobian:
         """Cost of matrices, factors and solutions so far, in evaluations, roughly."""
         n: Any = self.newton[0]
         factors, solutions = costs(self._stages.equations.n, self._stages.scheme.nodes.size)
-        return self._stages.jacobian.cost + solutions * int(n.iterations) + factors * int(n.factorisations)
+        known = self._stages.counts
+        iterations = solutions * (known["iterations"] + int(n.iterations))
+        return self._stages.jacobian.cost + iterations + factors * (known["factorisations"] + int(n.factorisations))
 
     def count(self) -> None:
         """Add the steps' costs since the last call to the method's counts."""
         n: Any = self.newton[0]
-        found = [int(n.iterations), int(n.factorisations)]
-        for name, now, before in zip(("iterations", "factorisations"), found, self._counted, strict=True):
-            self._stages.counts[name] += now - before
-        self._counted = found
-
-    def resume(self) -> None:
-        """Take the steps' costs so far as counted: the memory is that of a run that goes on."""
-        n: Any = self.newton[0]
-        self._counted = [int(n.iterations), int(n.factorisations)]
+        for name in ("iterations", "factorisations"):
+            self._stages.counts[name] += int(getattr(n, name))
+        n.iterations = n.factorisations = 0
 
     def parts(self) -> list[tuple[str, Any]]:
         """All that the next step depends on, by name."""

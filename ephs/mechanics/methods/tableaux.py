@@ -85,3 +85,7 @@ def arrays(a: Array, error: Array, coarse: Array | None = None) -> Mapping[str, 
         "coarse": np.zeros(error.size) if coarse is None else coarse,
         "eighth": np.array([int(coarse is not None)], dtype=np.int64),
     }
+
+
+MIDPOINT = arrays(np.array([[0.5], [1.0]]), np.zeros(2))
+"""A step by the rates in its middle."""

@@ -14,6 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.tableaux import MIDPOINT
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.naming import counted
@@ -74,12 +75,22 @@ class Variational(ReducedMethod):
         self._matrix: Array | None = None  # of a step of this length in s: it is larger as a step is shorter
         self._length = 0.0
         self._guess: tuple[Array, Array] | None = None
-        self._bounds: tuple[Attempt[ReducedState], Attempt[ReducedState]] | None = None  # of a part of a step
-        self._low: Attempt[ReducedState] | None = None  # the last part
         self.counts: dict[str, Any] = {"iterations": 0, "jacobians": 0, "keep": keep}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
+        return self.tried(state, h, part=False)
+
+    def tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
+        """One step, or a part of one, after which the matrix of the steps stays."""
+        kept = self._matrix, self._length, self._guess
+        try:
+            return self._step(state, h, part=part)
+        finally:
+            if part:
+                self._matrix, self._length, self._guess = kept
+
+    def _step(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
         eq = self.equations
         n = eq.n
         if self._matrix is not None and self._length not in (0.0, h):
@@ -98,20 +109,17 @@ class Variational(ReducedMethod):
         q = eq.moved(state.q, xi)
         mass = eq.mass(q, state.r)
         free = np.asarray(np.linalg.solve(mass, after), dtype=float)
-        heats = np.where(eq.heats.plain, 2.0 * states - state.heats, state.heats)
-        closed = eq.closed(ReducedState(state.t + h, q, free, heats, state.totals, account=state.account))
-        work, heat = h * powers[1:]
+        closed = eq.closed(ReducedState(state.t + h, q, free, state.heats, state.totals, account=state.account))
         if self._driven.size:  # the work of prescribed motions: their impulses at both ends of the step
             impulse = mass @ closed.r - after
             rows = eq.rows()
             second = least_squares(rows.T, impulse, part=CONSTRAINT)[: self._driven.size]
             first = push[: self._driven.size]
-            work += float(first @ state.r[self._driven] + second @ closed.r[self._driven])
-        passed, between = h * flows, None
-        if self._bounds is not None:
-            passed = eq.heats.between(passed, *(each.detail for each in self._bounds))
-            between = self._bounds[0].end, self._bounds[1].end
-        closed = eq.booking.step(state, closed, passed, work, heat, missed=np.zeros(passed.size), between=between)
+            powers[1] += float(first @ state.r[self._driven] + second @ closed.r[self._driven]) / h
+        warming = (states - state.heats) / (0.5 * h)
+        rates = np.concatenate([np.zeros(eq.nv + n), warming, powers, flows])
+        closed = eq.accounts.summed(state, closed, MIDPOINT, rates[None], h, part=part)
+        sums = np.array(eq.engine.totals["low" if part else "whole"])
         if self._keep == "momentum":
             eq.row(closed)  # which refuses an end without an energy: steps ask for forces in their middle
         else:
@@ -119,26 +127,7 @@ class Variational(ReducedMethod):
                 state, closed, h, np.full(eq.counted.size, np.inf), chosen=False, alone=True
             )
         self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
-        return Attempt(state, closed, h, 0.0, eq.least(state, closed), passed)
-
-    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
-        """A shorter step from the same start, in which heat is between that of the instant before and of the whole.
-
-        The matrix of the steps stays.
-        """
-        start, h, kept = attempt.start, t - attempt.start.t, (self._matrix, self._length, self._guess)
-        low = Attempt(start, start, 0.0, 0.0, 0.0, np.zeros(attempt.detail.size))
-        if self._low is not None and self._low.start is start and abs(self._low.h) <= abs(h):
-            low = self._low
-        self._bounds = low, attempt
-        try:
-            self._low = self.step(start, h)
-        except SolveError:
-            self._bounds = None
-            return super().inside(attempt, t)
-        finally:
-            self._bounds, (self._matrix, self._length, self._guess) = None, kept
-        return self._low.end
+        return Attempt(state, closed, h, 0.0, eq.least(state, closed), sums)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """The matrix and the length of its step, and the guess of the next step."""

@@ -3,7 +3,7 @@
 **Energies.** A storage of heat is advanced by the energy that it takes up, E = c1 (exp(s/c2) − 1); its entropy
 follows, with it the mean temperature θ̄ = ΔE/Δs of the step. With it components make flow · (1/θ̄ at the sink − 1/θ̄ at
 the source), so entropies change by what all make, to rounding, and friction never makes less than nothing. Of this sum
-each has the part that the temperatures at the method's stages say, see `Heats.taken`.
+each has the part that the temperatures at the method's stages say.
 
 **Friction.** The heat H of a step is a quadrature of powers, which says nothing of a motion that decays in the step.
 There D = E⁰ + W − E¹ of all that is not heat is right, where Radau IIA finds a hundredth of it at hλ = 2000 and the
@@ -23,19 +23,12 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Primitive, Storage
-from ephs.semantics.spaces.rank import TINY
 from ephs.solve.posing.errors import Outcome, SolveError
 
 EXPONENTIAL = 1e-12
 """Relative tolerance for recognising an exponential energy law: rounding of the functions."""
-LITTLE = 0.1
-"""Part of a step's heat by which it may be less than a quadrature finds, where the motion gained that energy: moving
-rates instead would leave the slow motion of what friction holds."""
 LINEAR = 1e-8
 """Change of a temperature, relative, below which a series is taken: its square is below rounding."""
-TRUSTED = 0.5
-"""Part of what stages say that components made by which it may differ from the entropy of the stores: a step beyond
-that has other errors."""
 PLAIN = -2
 """In place of a component: a state of an attachment, which is integrated directly and not as energy."""
 
@@ -74,12 +67,8 @@ class Heats:
         c1 in J and c2 in J/K of these storages, as they are at present.
     ends
         (flows, 2) the entropies where a flow comes from and where it goes, −1 where there is none.
-    frictions
-        (frictions,) the flows that are heat of friction.
     theta
         Temperature of the environment in K.
-    owners
-        (flows,) the first flow of each one's component, for which the entropy that it makes counts.
     """
 
     def __init__(
@@ -88,21 +77,13 @@ class Heats:
         components: Index,
         laws: Callable[[], tuple[Array, Array]],
         ends: Index,
-        frictions: Index,
         theta: float,
-        owners: Index,
     ) -> None:
         self._paths, self._components, self._present, self._theta = paths, components, laws, theta
         self._nodes, self.plain = components >= 0, components == PLAIN
         self._booked, self._units = bool(np.any(self._nodes)), np.where(self.plain, 1.0, theta)
-        self.frictions, self._owners = frictions, owners
         self._source, self._sink = ends.T
         self._loose = np.where(np.all(ends < 0, axis=1), 1.0, 0.0)
-        counted = np.where(self.plain, 0.0, 1.0)
-        single = _end_values(counted, self._sink) - _end_values(counted, self._source)
-        single[frictions] = 0.0
-        self.carried = single
-        """(flows,) 1 where a flow without friction carries energy from other states into energy accounts."""
 
     @property
     def _laws(self) -> tuple[Array, Array]:
@@ -157,60 +138,11 @@ class Heats:
             self._source >= 0, _end_values(theta, self._source), _end_values(theta, self._sink) + self._loose
         )
 
-    def booked(self, flows: Array, missed: Array | None, lost: float | None) -> Array:
-        """Flows of a step with friction's heat moved towards the energy that the motion lost.
-
-        Parameters
-        ----------
-        flows, missed
-            (makers,) in J by a quadrature, and its differences to an embedded one; None where it finds no more heat
-            than is lost.
-        lost
-            E⁰ + W − E¹ in J; None where the work is what the energies say.
-        """
-        if lost is None or not self.frictions.size:
-            return flows
-        out, k = flows.copy(), self.frictions
-        short = lost - float(flows[k].sum())
-        made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not concealed
-        if missed is None:
-            whole = float(made.sum())
-            out[k] += made * (short / whole if whole > 0.0 and short > -LITTLE * whole else 0.0)
-            return out
-        room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), made)
-        whole = float(room.sum())
-        if whole > 0.0:
-            out[k] = np.maximum(flows[k] - made, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
-        return out
-
-    def between(self, flows: Array, low: Array, high: Array) -> Array:
-        """Flows of a part of a step, those of friction and conduction between what a shorter part and the whole pass.
-
-        So heat does not fall from instant to instant within a step.
-        """
-        held = self._source >= 0
-        held[self.frictions] = True
-        return np.where(held, np.clip(flows, np.minimum(low, high), np.maximum(low, high)), flows)
-
-    def most(self, heats: Array, flows: Array) -> Array:
-        """(components,) entropies in J/K that flows in J carry in and out of components, by their sizes."""
-        cold = 1.0 / self.temperatures(heats)
-        carried = np.abs(flows) * (_end_values(cold, self._sink) + _end_values(cold, self._source) + self._loose)
-        return np.bincount(self._owners, carried, flows.size).astype(float)
-
-    def taken(
-        self, heats: Array, flows: Array, stages: tuple[Array, Array, Array] | None = None
-    ) -> tuple[Array, Array]:
-        """Changes of energies in J by the flows of a step, those of other states not at all; and the entropy that each
-        component made in J/K.
+    def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
+        """Changes of energies in J by the flows of a step, those of other states not at all; and (flows,) the entropy
+        that each makes in J/K.
 
         By mean temperatures of the step these sum up to the change of entropies, but each is of order two in the step.
-        Stages say each to the order of the method; what that misses in the sum is shared in proportion.
-
-        Parameters
-        ----------
-        stages
-            (stages,) weights in s, (stages, entropies) energies in J and (stages, flows) in W there.
 
         Raises
         ------
@@ -229,42 +161,7 @@ class Heats:
         small = np.abs(share) < LINEAR  # θ̄/θ = x / log(1 + x)
         ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
         cold = 1.0 / (theta * ratio)
-        made = flows * self._factors(cold)
-        if stages is not None:
-            made = self._shared(made, flows, *stages)
-        return change, np.bincount(self._owners, made, flows.size).astype(float)
-
-    def _factors(self, cold: Array) -> Array:
-        """(..., flows) entropy that a flow makes by its energy, in 1/K, of 1/θ of the entropies."""
-        return _end_values(cold, self._sink) - _end_values(cold, self._source) + self._loose
-
-    def _shared(self, whole: Array, flows: Array, weights: Array, energies: Array, powers: Array) -> Array:
-        """(flows,) entropies made in J/K by stages, with the sum of those by mean temperatures."""
-        passed, parts = weights @ powers, weights @ (powers * self._factors(1.0 / self.temperatures(energies)))
-        k = self.frictions
-        same = passed[k] * flows[k] > 0.0  # friction's heat follows what the motion lost
-        parts[k] = np.where(same, parts[k] * flows[k] / np.where(same, passed[k], 1.0), whole[k])
-        alone = self._source >= 0  # else it may be one of several flows of a component
-        alone[k] = True
-        parts = np.where(alone & (parts * weights.sum() < 0.0), whole, parts)
-        nodes = self._nodes.astype(float)
-        stored = _end_values(nodes, self._sink) + _end_values(nodes, self._source) > 0.0
-        rest, size = float((whole - parts)[stored].sum()), float(np.abs(parts[stored]).sum())
-        shared = parts + np.abs(parts) * rest / max(size, TINY)
-        return np.where(stored, shared, whole) if abs(rest) < TRUSTED * size else whole
-
-
-def held_between(made: Array, low: Array, high: Array) -> Array:
-    """Entropies (components,) made in a part of a step, with their sum, each between those of a shorter part and of the
-    whole, if their sums allow that."""
-    held = np.clip(made, np.minimum(low, high), np.maximum(low, high))
-    rest = float((made - held).sum())
-    room = (high if rest * float((high - low).sum()) > 0.0 else low) - held
-    whole = float(room.sum())
-    share = rest / whole if whole else np.inf
-    if rest == 0.0:
-        return held
-    return held + room * share if 0.0 < share <= 1.0 else made
+        return change, flows * (_end_values(cold, self._sink) - _end_values(cold, self._source) + self._loose)
 
 
 def _end_values(values: Array, ends: Index) -> Array:

@@ -61,7 +61,8 @@ class Memory:
     change, size
         (summed,): what a step adds to the sums, and the sizes of what that adds up.
     whole, low
-        (summed,): such changes before `Motion.book`, of the whole step and of its part that was kept last.
+        (2 · summed,): such changes before and after `Motion.book`, of the whole step and of its part that was kept
+        last.
     times
         (instants,): to keep.
     rows_t, rows_q, rows_y

@@ -125,8 +125,9 @@ class Motion(ABC):
         """Lift what an iterate y of a step from y0 may not be below."""
 
     @abstractmethod
-    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
-        """Put a part's sums between those of a shorter part of the step and those of the whole."""
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector, *, made: bool) -> None:
+        """Put a part's sums between those of a shorter part of the step and those of the whole; with ``made`` what
+        `book` made of them."""
 
     @abstractmethod
     def open(self, on: Evaluator, account: RunAccount, q: Vector, y: Vector) -> Integer:

@@ -103,7 +103,8 @@ def book(
     With the elements q at the end of a step whose method damps, heat is made of the energy that this takes out.
     Flows that go both ways within a step, and back by less than the rounding of the energy, or a speck, are zero.
     """
-    at, count = motion.summed, tableau.a.columns
+    at, count, n = motion.summed, tableau.a.columns, totals.change.size
+    whole, low, made, made_before = (x.part(first, n) for first in (0, n) for x in (totals.whole, totals.low))
     nothing = on.maximum(SPECK, motion.rounding(on, anchor, totals.start))
 
     def each_entry(j: Integer) -> None:
@@ -121,7 +122,7 @@ def book(
         back = on.both(on.both(change < 0.0, most.value > 0.0), change >= -nothing)
 
         def keep() -> None:
-            totals.whole[j] = on.select(back, 0.0, change)
+            whole[j] = on.select(back, 0.0, change)
 
         on.when(on.negate(hold), keep)
 
@@ -131,13 +132,13 @@ def book(
 
     def part() -> None:
         absorb()
-        motion.hold(on, totals.change, totals.low, totals.whole)
-        copy(on, totals.change, totals.low)
+        motion.hold(on, totals.change, low, whole, made=False)
+        copy(on, totals.change, low)
 
     def entire() -> None:
-        motion.hold(on, totals.change, totals.whole, totals.whole)
+        motion.hold(on, totals.change, whole, whole, made=False)
         absorb()
-        copy(on, totals.change, totals.whole)
+        copy(on, totals.change, whole)
         clear(on, totals.low)
 
     def grow(j: Integer) -> None:
@@ -146,6 +147,12 @@ def book(
     on.loop(totals.change.size, each_entry)
     on.when(hold, part, entire)
     status = motion.book(on, tableau, k, h, totals)
+
+    def between() -> None:
+        motion.hold(on, totals.change, made_before, made, made=True)
+        copy(on, totals.change, made_before)
+
+    on.when(hold, between, lambda: copy(on, totals.change, made))
     on.loop(totals.change.size, grow)
     return status
 

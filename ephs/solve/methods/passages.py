@@ -5,7 +5,7 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.numbering import spans
+from ephs.semantics.descriptor.numbering import Index, spans
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.equations.heats import Heats
@@ -36,7 +36,7 @@ class Passages:
         count = np.bincount(owners[thermal], minlength=t.kind.size)
         chosen = np.flatnonzero(thermal & (stores.at[efforts] >= 0))
         self._makers, self._flows, effort = owners[chosen], flows[chosen], efforts[chosen]
-        frictions = (count[self._makers] == 1) & (t.dims[self._makers, 0] > 1)
+        self._frictions = np.flatnonzero((count[self._makers] == 1) & (t.dims[self._makers, 0] > 1))
         self._effort, self._intensive = int(t.counts[0]) + effort, t.intensive[effort]
         self._conducting = np.searchsorted(self._flows, conduction.ports) if conduction is not None else None
         self.called = chosen.size > (0 if conduction is None else conduction.ports.size)
@@ -44,8 +44,7 @@ class Passages:
         self._heats = Heats(
             tuple(d.components[number].path for number in stores.components.tolist()),
             np.where(stores.hot, stores.components, -1), lambda: (stores.c1, stores.c2),
-            np.stack([np.full(at.size, -1), at], axis=1), np.flatnonzero(frictions), model.reference.temperature,
-            np.arange(at.size),
+            np.stack([np.full(at.size, -1), at], axis=1), model.reference.temperature,
         )  # fmt: skip
         self._rest = (t.kind == STORING).astype(float)
         self._rest[stores.components] = 0.0
@@ -59,7 +58,7 @@ class Passages:
     @property
     def frictions(self) -> bool:
         """Whether some heat is that of friction, which follows what other states lose."""
-        return bool(self._heats.frictions.size)
+        return bool(self._frictions.size)
 
     def powers(self, found: AccumulatorRates) -> Array:
         """(2, passages) power in W and entropy in W/K that go to the stores at an instant, conduction aside."""
@@ -97,7 +96,7 @@ class Passages:
             More heat was carried away than there is.
         """
         heat, entropy = np.zeros((2, self._makers.size)) if passed is None else passed
-        stores, frictions, lost, counted = self._stores, self._heats.frictions, None, entropy.copy()
+        stores, frictions, lost, counted = self._stores, self._frictions, None, entropy.copy()
         if self._conduction is not None:
             conduction, (weights, ys) = self._conduction, stages
             powers = (conduction.powers @ ys.T).T + conduction.rest
@@ -106,7 +105,7 @@ class Passages:
         if self._whole and energies is not None:
             others = float(heat.sum()) - float(heat[frictions].sum())
             lost = work - float((energies[1] - energies[0]) @ self._rest) - others
-        flows = self._heats.booked(heat, missed, lost)
+        flows = heat_of_friction(heat, frictions, missed, lost)
         before = y[stores.states] * stores.units
         change, made = self._heats.taken(before, flows)
         made = self._shared(made, entropy * np.divide(flows, heat, out=np.ones(heat.size), where=heat != 0.0))
@@ -122,3 +121,27 @@ class Passages:
         sizes, at = np.abs(parts), self._at
         total, rest = np.bincount(at, sizes), np.bincount(at, whole - parts)
         return np.where(total[at] > 0.0, parts + rest[at] * sizes / np.maximum(total[at], TINY), whole)
+
+
+def heat_of_friction(flows: Array, frictions: Index, missed: Array | None, lost: float | None) -> Array:
+    """Flows of a step with friction's heat moved towards the energy that the motion lost.
+
+    Parameters
+    ----------
+    flows, missed
+        (passages,) in J by a quadrature, and its differences to an embedded one; None where there is no friction.
+    frictions
+        Those that are heat of friction.
+    lost
+        E⁰ + W − E¹ in J; None where the work is what the energies say.
+    """
+    if lost is None or missed is None:
+        return flows
+    out, k = flows.copy(), frictions
+    short = lost - float(flows[k].sum())
+    made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not concealed
+    room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), made)
+    whole = float(room.sum())
+    if whole > 0.0:
+        out[k] = np.maximum(flows[k] - made, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
+    return out

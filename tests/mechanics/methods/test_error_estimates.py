@@ -142,7 +142,7 @@ def test_matrices_are_kept_for_steps_of_one_length_and_made_anew_when_asked(equa
         made.kept.solvers(h)
         assert method.counts["factorisations"] == factorised
     before = method.counts["jacobians"]
-    made.keep(fast=False)
+    made.kept.stale = True
     made.solve(start, y, 0.2)
     assert method.counts["jacobians"] == before + 1
     assert method.counts["factorisations"] == 3

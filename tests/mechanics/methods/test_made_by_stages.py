@@ -8,9 +8,14 @@ from scipy.integrate import solve_ivp
 
 import ephs
 from ephs.mechanics.methods.explicit import tableau
+from ephs.mechanics.methods.tableaux import MIDPOINT
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
 from ephs.mechanics.sensitivity.family import ParameterFamily
-from ephs.solve.equations.heats import Heats
+from ephs.mechanics.tree.equations.accounts import Accounts
+from ephs.mechanics.tree.equations.equations import ReducedEquations
+from ephs.mechanics.tree.sweeps.acting import TOTALS
+from ephs.solve.posing.errors import SolveError
 from tests.mechanics.methods.test_heat import arms
 from tests.numerics import EPS, largest
 from tests.scenes import shipped
@@ -91,7 +96,15 @@ def test_semi_implicit_steps_do_so_too():
 
 
 def by_means(monkeypatch):
-    monkeypatch.setattr(Heats, "_shared", lambda self, whole, *_: whole)
+    """Stages that have nothing to do with the step: mean temperatures are taken."""
+    booked = Accounts.booked
+
+    def without(self, start, scheme, k, *given, **more):
+        a = scheme["a"].copy()
+        a[:-1] *= 1e6
+        return booked(self, start, {**scheme, "a": a}, k, *given, **more)
+
+    monkeypatch.setattr(Accounts, "booked", without)
 
 
 def test_mean_temperatures_alone_do_not(monkeypatch):
@@ -142,19 +155,38 @@ def test_a_step_with_derivatives_makes_what_a_step_makes(method, inputs):
     assert np.all(np.abs(point.y[0][-expected.size :] - slopes) <= 1e-6 * np.abs(slopes))
 
 
+def test_a_step_that_takes_more_heat_from_a_store_than_there_is_says_so():
+    """Three quarters of it leave a temperature; five quarters do not, and the store is named."""
+    eq = ReducedEquations(problem_of_scene(shipped("hot-brake")), 0.0)
+    start = eq.start(0.0)
+    rates = np.zeros((1, eq.size))
+    rates[0, eq.nv + eq.n] = -0.75 * DISC * 293.15
+    eq.accounts.booked(start, MIDPOINT, rates, 1.0, eq.vector(start))
+    rates *= 5.0 / 3.0
+    with pytest.raises(SolveError, match="temperature") as refused:
+        eq.accounts.booked(start, MIDPOINT, rates, 1.0, eq.vector(start))
+    assert refused.value.path == "thermal.disc"
+
+
 def test_stages_share_what_they_miss_and_a_step_beyond_that_takes_means():
-    """Two stores and a conductor: by one stage, by a stage in the middle, and by one that has nothing to do with it."""
-    heats = Heats(
-        ("a", "b"), np.array([0, 1]), lambda: (np.array([300.0, 600.0]), np.array([1.0, 2.0])),
-        np.array([[0, 1], [-1, 0]]), np.array([1]), 300.0, np.arange(2),
-    )  # fmt: skip
-    start, flows = np.array([30.0, 0.0]), np.array([4.0, 1.0])
-    change, whole = heats.taken(start, flows)
-    middle = np.ones(1), (start + 0.5 * change)[None], flows[None]
-    again, parts = heats.taken(start, flows, middle)
-    assert np.array_equal(change, again) and parts.sum() == pytest.approx(whole.sum(), rel=8.0 * EPS)
-    assert largest(parts / whole - 1.0) < 1e-2 and not np.array_equal(parts, whole)
-    assert np.array_equal(heats.taken(start, flows, (np.ones(1), start[None] * 20.0, flows[None]))[1], whole)
+    """Heat of a brake and through its pads: by a stage in the middle, and by one that has nothing to do with it."""
+    eq = ReducedEquations(problem_of_scene(shipped("hot-brake")), 0.0)
+    start = eq.start(0.0)
+    h, y0 = 0.5, eq.vector(start)
+    rates = eq.rates(0.0, start.q, y0)
+    middle = eq.rates(0.5 * h, start.q, y0 + 0.5 * h * rates)[None]
+
+    def made(a):
+        y, _ = eq.accounts.booked(start, {**MIDPOINT, "a": np.array([[a], [1.0]])}, middle, h, y0 + h * middle[0])
+        heats, totals = np.split(y[eq.nv + eq.n :], [eq.ns])
+        rise = eq.heats.entropies(heats) - eq.heats.entropies(start.heats)
+        assert abs(totals[TOTALS:].sum() - rise.sum()) <= 8.0 * EPS * np.abs(eq.heats.entropies(heats)).sum()
+        return totals[TOTALS:]
+
+    means = eq.heats.taken(start.heats, h * middle[0][-len(eq.reduced.made) :])[1]
+    parts, far = made(0.5) - means, made(1e6) - means
+    assert 1e-9 < largest(parts) / means.sum() < 1e-2
+    assert largest(far) <= 64.0 * EPS * means.sum()
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87", "radau"])

@@ -52,6 +52,7 @@ class Engine:
         summed = size - self._r.size - work["still"].size
         self._held, self._heats = np.zeros(3), np.zeros(work["entropy"].size)
         self.totals = {name: np.zeros(summed) for name in members(Totals)} | {"start": self._start, "end": self._y}
+        self.totals |= {name: np.zeros(2 * summed) for name in ("whole", "low")}
         self._counted = 2 * self._r.size + work["entropy"].size
         self._account, self._allowed = RunAccount.table(1), np.zeros(self._counted)
         self._stages: dict[int, tuple[dict[str, Array], Table[MarchControl], Array, Array, Bound]] = {}
@@ -158,12 +159,12 @@ class Engine:
         return self._y.copy()
 
     def sum(
-        self, tableau: Mapping[str, Any], k: Array, h: float, base: Array, y0: Array, y1: Array, carry: Array, *,
-        anchor: float, part: bool, damped: bool,
+        self, tableau: Mapping[str, Any], k: Array, h: float, y0: Array, y1: Array, carry: Array, *, anchor: float,
+        part: bool, damped: Array | None,
     ) -> tuple[int, Array, Array]:  # fmt: skip
         """Sum what a step with rates k adds to heats and totals; a part of one is held by ``totals``.
 
-        ``anchor`` is that of the account; ``damped``: whether energy that is missing becomes heat.
+        ``anchor`` is that of the account; ``damped``: elements at the end, where energy that is missing becomes heat.
 
         Returns
         -------
@@ -173,12 +174,13 @@ class Engine:
         known = self._sums.get(id(tableau))
         if known is None or known[0] is not tableau:
             rows = np.zeros(k.shape)
-            given = tableau, rows, self.totals, self._base, self._q
-            known = tableau, rows, self.bind("summed", *given, h, anchor, int(part), int(damped))
+            known = tableau, rows, self.bind("summed", tableau, rows, self.totals, self._q, h, anchor, 0, 0)
             self._sums[id(tableau)] = known
         _, rows, summed = known
-        self._base[:], self._start[:], self._y[:], self.totals["before"][:], rows[:] = base, y0, y1, carry, k
-        status = int(summed(h, anchor, int(part), int(damped)))
+        self._start[:], self._y[:], self.totals["before"][:], rows[:] = y0, y1, carry, k
+        if damped is not None:
+            self._q[:] = damped
+        status = int(summed(h, anchor, int(part), int(damped is not None)))
         return status, self._y.copy(), self.totals["after"].copy()
 
     def correct(

@@ -6,11 +6,17 @@ from typing import final
 from ephs.mechanics.tree.sweeps.acting import TOTALS, Tables, Work
 from ephs.semantics.descriptor.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector
-from ephs.solve.equations.heats import LITTLE, PLAIN, TRUSTED
+from ephs.solve.equations.heats import PLAIN
 from ephs.solve.march.records import TableauRecord
 
 ROUNDING = 100.0 * 2.220446049250313e-16
 """Part of what a sum of flows adds up by which it may be off: 10 κ ε with a condition κ of 10."""
+LITTLE = 0.1
+"""Part of a step's heat by which it may be less than a quadrature finds, where the motion gained that energy: moving
+rates instead would leave the slow motion of what friction holds."""
+TRUSTED = 0.5
+"""Part of what stages say that components made by which it may differ from the entropy of the stores: a step beyond
+that has other errors."""
 
 
 def _log_ratio(on: Evaluator, x: Real) -> Real:
@@ -152,11 +158,12 @@ def _cold_outside(on: Evaluator, tables: Tables, node: Integer) -> Real:
 def count(
     on: Evaluator, tables: Tables, work: Work, before: Vector, change: Vector, size: Vector | None,
     stages: StageRates | None = None,
-) -> None:  # fmt: skip
+) -> Integer:  # fmt: skip
     """Put what components made in a step in place of what they passed on, in the changes of (heats, totals, flows).
 
-    Mean temperatures of the step are ΔE/Δs: so entropies change by what is made. See
-    `ephs.solve.equations.heats.Heats.taken`, also for what stages say of each component's part.
+    Mean temperatures of the step are ΔE/Δs: so entropies change by what is made, to rounding. By them each component's
+    part is of order two in the step. Stages say each to the order of the method; what that misses in the sum is shared
+    in proportion. The status returned is that of a store from which more heat was carried away than there is.
 
     Parameters
     ----------
@@ -166,7 +173,7 @@ def count(
         Sums of the sizes of what the changes add up; those of flows become rounding of what was made.
     """
     cold, nodes, parts = work.temperature, tables.node.size, work.spare
-    rest, whole = on.variable(0.0), on.variable(0.0)
+    rest, whole, status = on.variable(0.0), on.variable(0.0), on.counter(0)
 
     def node(k: Integer) -> None:
         row = tables.node[k]
@@ -176,7 +183,13 @@ def count(
 
         def inside() -> None:
             held = row.c1 + before[k]
-            cold[k] = _log_ratio(on, change[k] / held) * row.c2 / held
+            share = change[k] / held
+
+            def refuse() -> None:
+                status.value, work.fault[0] = TEMPERATURE, row.component
+
+            cold[k] = _log_ratio(on, share) * row.c2 / held
+            on.when(on.negate(share > -1.0), refuse)
 
         on.when(row.component < 0, outside, inside)
 
@@ -249,6 +262,7 @@ def count(
     if stages is not None:
         on.when(on.absolute(rest.value) < TRUSTED * whole.value, share_all)
     on.loop(tables.sink.size, gather)
+    return status.value
 
 
 def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sign: Real) -> Integer:
@@ -273,7 +287,7 @@ def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sig
 def absorb(on: Evaluator, tables: Tables, lost: Real, change: Vector) -> None:
     """Make the heat of friction in a step's changes what the motion lost in J.
 
-    See `ephs.solve.equations.heats.Heats.booked`.
+    It is shared by what each component made: see `ephs.solve.equations.heats`.
     """
     nodes, whole = tables.node.size, on.variable(0.0)
 
@@ -314,12 +328,19 @@ def warm(on: Evaluator, tables: Tables, before: Vector, heats: Vector) -> None:
     on.loop(tables.node.size, each_node)
 
 
-def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vector) -> None:
+def hold(
+    on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vector, *, made: bool
+) -> None:  # fmt: skip
     """Put the flows of a part of a step between those of a shorter part and those of the whole, and heats with them.
 
-    So heat does not fall from instant to instant within a step. All are changes of (heats, totals, flows).
+    So heat does not fall from instant to instant within a step. All are changes of (heats, totals, flows); with
+    ``made`` what components made is in place of flows, and nothing else moves.
     """
     nodes = tables.node.size
+    if made:
+        first = nodes + TOTALS
+        held_between(on, *(each.part(first, each.size - first) for each in (change, low, high)))
+        return
 
     def clamped(maker: Integer) -> Real:
         at = nodes + TOTALS + maker
@@ -345,3 +366,32 @@ def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vecto
 
     on.loop(tables.sink.size, friction)
     on.loop(tables.conduction.size, conduction)
+
+
+def held_between(on: Evaluator, made: Vector, low: Vector, high: Vector) -> None:
+    """Put entropies made in a part of a step, with their sum, each between those of a shorter part and of the whole.
+
+    They stay where their sums do not allow that.
+    """
+    rest, grown, above, below = (on.variable(0.0) for _ in range(4))
+
+    def kept(j: Integer) -> Real:
+        return on.minimum(on.maximum(made[j], on.minimum(low[j], high[j])), on.maximum(low[j], high[j]))
+
+    def weigh(j: Integer) -> None:
+        held = kept(j)
+        rest.value, grown.value = rest.value + (made[j] - held), grown.value + (high[j] - low[j])
+        above.value, below.value = above.value + (high[j] - held), below.value + (low[j] - held)
+
+    on.loop(made.size, weigh)
+    up = rest.value * grown.value > 0.0
+    room = on.select(up, above.value, below.value)
+    still = on.negate(on.absolute(rest.value) > 0.0)
+    share = on.select(still, 0.0, rest.value / on.select(on.absolute(room) > 0.0, room, 1.0))
+    allowed = on.either(still, on.both(on.absolute(room) > 0.0, on.both(share > 0.0, share <= 1.0)))
+
+    def place(j: Integer) -> None:
+        held = kept(j)
+        made[j] = held + share * (on.select(up, high[j], low[j]) - held)
+
+    on.when(allowed, lambda: on.loop(made.size, place))

@@ -236,10 +236,11 @@ class Mechanism(Motion):
 
     def book(self, on: Evaluator, tableau: TableauRecord, k: Matrix, h: Real, totals: Totals) -> Integer:
         before, stages = totals.start.part(self.summed, totals.change.size), StageRates(tableau, k, h, self.summed)
-        count(on, self.tables, self.work, before, totals.change, totals.size, stages)
+        status = count(on, self.tables, self.work, before, totals.change, totals.size, stages)
         lost = lawless(on, self.tables, totals.change, totals.size, on.select(h >= 0.0, 1.0, -1.0))
-        self.work.fault[0] = on.select(lost > 0, lost - 1, self.work.fault[0])
-        return on.select(lost > 0, int(Status.LAWLESS), 0)
+        lawful = on.either(status > 0, on.negate(lost > 0))
+        self.work.fault[0] = on.select(lawful, self.work.fault[0], lost - 1)
+        return on.select(lawful, status, int(Status.LAWLESS))
 
     def count(self, on: Evaluator, start: Vector, y: Vector, stages: StageRates | None = None) -> None:
         """Put what components made in a step in place of what they passed on, at its end y."""
@@ -270,8 +271,8 @@ class Mechanism(Motion):
         ns = self.tables.node.size
         warm(on, self.tables, y0.part(self.summed, ns), y.part(self.summed, ns))
 
-    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
-        hold(on, self.tables, change, low, high)
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector, *, made: bool) -> None:
+        hold(on, self.tables, change, low, high, made=made)
 
     def correct(
         self, on: Evaluator, account: RunAccount, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector,

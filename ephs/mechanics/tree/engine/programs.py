@@ -80,19 +80,15 @@ def motion_program(*, looped: bool) -> Program:
         motion.count(on, before, after)
 
     def summed(
-        on: Evaluator, motion: Mechanism, tableau: TableauRecord, k: Matrix, totals: Totals, base: Vector, q: Vector,
-        h: Real, anchor: Real, part: Integer, damped: Integer,
+        on: Evaluator, motion: Mechanism, tableau: TableauRecord, k: Matrix, totals: Totals, q: Vector, h: Real,
+        anchor: Real, part: Integer, damped: Integer,
     ) -> Integer:  # fmt: skip
         status = on.counter(0)
 
         def add(end: Vector | None) -> None:
             status.value = book(on, motion, tableau, k, h, totals, anchor, on.same(part, 1), end)
 
-        def absorb() -> None:
-            motion.advance(on, base, totals.end, q)
-            add(q)
-
-        on.when(on.same(damped, 1), absorb, lambda: add(None))
+        on.when(on.same(damped, 1), lambda: add(q), lambda: add(None))
         return status.value
 
     def corrected(

@@ -74,7 +74,7 @@ class Accounts:
 
     def booked(
         self, start: "ReducedState", tableau: Mapping[str, Any], k: Array, h: float, y1: Array, *, part: bool = False,
-        damped: bool = False,
+        damped: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """The end y1 of a step with rates k with heats and totals, and the account with what rounding left of them.
 
@@ -83,19 +83,33 @@ class Accounts:
         part
             Whether it is a part of a step: its sums lie between those in the engine's ``totals``.
         damped
-            Whether energy that the step misses becomes heat.
+            Elements at the end, where energy that the step misses becomes heat.
 
         Raises
         ------
         SolveError
-            A component lost entropy in the step.
+            A component lost entropy in the step, or more heat was carried away than there is.
         """
         eq, start = self._equations, self.opened(start)
         carry, anchor = start.account[self.own :], float(start.account[0])
-        given = tableau, k, h, start.q, eq.vector(start), y1, carry
+        given = tableau, k, h, eq.vector(start), y1, carry
         status, y, carry = eq.engine.sum(*given, anchor=anchor, part=part, damped=damped)
         eq.refuse(status, eq.engine.failed)
         return y, np.concatenate([start.account[: self.own], carry])
+
+    def summed(
+        self, start: "ReducedState", end: "ReducedState", tableau: Mapping[str, Any], k: Array, h: float, *,
+        part: bool = False, damped: bool = False,
+    ) -> "ReducedState":  # fmt: skip
+        """The end of a step, whose loops are closed, with heats and totals and its account; see `booked`.
+
+        Work that its totals have beyond those of the start, as of motions that it follows, is added to that of rates.
+        """
+        eq = self._equations
+        at = eq.nv + eq.n
+        k[:, at + eq.ns + 1] += (end.totals[1] - start.totals[1]) / h
+        y, account = self.booked(start, tableau, k, h, eq.vector(end), part=part, damped=end.q if damped else None)
+        return replace(end, heats=y[at : at + eq.ns], totals=y[at + eq.ns :], account=account)
 
     def corrected(
         self, start: "ReducedState", end: "ReducedState", h: float, allowed: Array, *, chosen: bool,

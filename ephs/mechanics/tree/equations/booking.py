@@ -1,25 +1,20 @@
-"""Totals of a step on the reduced form, which components passed on and made, and its work; and records of states."""
+"""Records of states on the reduced form: the energies that they hold, and what was summed up to them."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.tree.engine.heats import ROUNDING
 from ephs.mechanics.tree.engine.states import STATES, StorageRow
 from ephs.mechanics.tree.engine.tables import table_of
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage import Table
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.kept import once
-from ephs.solve.equations.heats import held_between
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.records import STORING
-from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.result.record import RunRecord
 
 if TYPE_CHECKING:
@@ -28,7 +23,7 @@ if TYPE_CHECKING:
 
 @final
 class Booking:
-    """Totals that a mechanism's steps sum up."""
+    """Records of one mechanism."""
 
     def __init__(self, equations: "ReducedEquations", paper: PaperStates) -> None:
         self._equations, self.paper = equations, paper
@@ -45,75 +40,6 @@ class Booking:
         rows = np.hstack([model.resting(kept)[kept][:, None], t.dims[kept], places])
         number = {slot.path: i for i, slot in enumerate(components)}
         return table_of(StorageRow, rows), np.array([number[path] for path in self._equations.reduced.made], dtype=int)
-
-    def step(
-        self,
-        start: "ReducedState",
-        end: "ReducedState",
-        flows: Array,
-        work: float,
-        passed: float = 0.0,
-        *,
-        missed: Array | None = None,
-        stages: tuple[Array, Array, Array] | None = None,
-        between: tuple["ReducedState", "ReducedState"] | None = None,
-        refused: bool = True,
-    ) -> "ReducedState":
-        """The end of a step with heats and totals, see `Heats`, by sums that lose nothing to rounding.
-
-        Parameters
-        ----------
-        end
-            Its loops are closed.
-        flows, missed
-            (makers,) in J over the step, and by how much their quadrature may be off; None where it finds no more heat
-            than is lost.
-        work, passed
-            By what drives, and heat to entropies that are not booked, in J over the step.
-        stages
-            As of `Heats.taken`.
-        between
-            Ends of a shorter step from the same start and of a longer one, between which components make their entropy.
-        refused
-            Whether a step is refused in which a component loses entropy.
-
-        Raises
-        ------
-        SolveError
-            The step is refused, or more heat was carried away than there is.
-        """
-        eq, heats = self._equations, self._equations.heats
-        start = eq.accounts.opened(start)
-        flows = heats.booked(flows, missed, self._lost(start, end, flows, work))
-        change, made = heats.taken(start.heats, flows, stages)
-        if between is not None:
-            made = held_between(made, *(each.totals[TOTALS:] - start.totals[TOTALS:] for each in between))
-        if refused:
-            self._refuse(made, flows, start, end)
-        heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
-        change = np.where(heats.plain, end.heats - start.heats, change)
-        sums, at = np.concatenate([start.heats, start.totals]), start.heats.size
-        added = np.concatenate([change, [heat, work, passed], made])
-        sums, carry = grown(sums, start.account[eq.accounts.own :], added)
-        account = np.concatenate([start.account[: eq.accounts.own], carry])
-        return replace(end, heats=sums[:at], totals=sums[at:], account=account)
-
-    def _lost(self, start: "ReducedState", end: "ReducedState", flows: Array, work: float) -> float | None:
-        """Energy in J that is neither stored at the end, nor passed on by others than friction."""
-        eq = self._equations
-        if not eq.heats.frictions.size or np.isnan(start.account[0]):
-            return None
-        held = float(eq.engine.energy(end.q, end.r, end.heats)[:2].sum())
-        before = float(start.account[0] + start.totals[1] - start.totals[0])
-        return before + work - held - float(flows @ eq.heats.carried)
-
-    def _refuse(self, made: Array, flows: Array, start: "ReducedState", end: "ReducedState") -> None:
-        """Refuse a step in which a component lost entropy beyond rounding, in the direction of time."""
-        eq = self._equations
-        rounding = ROUNDING * eq.heats.most(start.heats, flows)
-        lost = np.flatnonzero(np.sign(end.t - start.t) * made < -rounding)
-        if lost.size:
-            raise SolveError(Outcome.LAWLESS, str(eq.reduced.made[int(lost[0])]), "")
 
     def arrays(self) -> list[Any]:
         """All arrays of the tables that states are made from."""

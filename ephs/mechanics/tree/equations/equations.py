@@ -137,6 +137,10 @@ class ReducedEquations:
             out[nv : nv + n] += self.holding(t, q, y[nv : nv + n], out[nv : nv + n])
         return out
 
+    def accelerations(self, state: ReducedState) -> Array:
+        """(n,) of the tree's degrees of freedom at a state."""
+        return self.rates(state.t, state.q, self.vector(state))[self.nv : self.nv + self.n]
+
     def unheld(self, base: Array, y: Array) -> tuple[Array, Array]:
         """The elements base·exp(v), and `rates` under the inputs at hand, where no contacts are held."""
         status, q, out = self.engine.rates(base, y)
@@ -189,9 +193,7 @@ class ReducedEquations:
 
     def moved(self, q: Array, change: Array) -> Array:
         """q·exp(change), the change given for the tree's joints; cut ones stay."""
-        v = np.zeros(self.nv)
-        v[: self.n] = change
-        return self.advance(q, v)
+        return self.advance(q, np.concatenate([change, np.zeros(self.nv - self.n)]))
 
     # ---- closing loops -----------------------------------------------------------------------------------------
 
@@ -381,9 +383,7 @@ class ReducedEquations:
         state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(self.summed)))
         self.led.start(lambda: self.row(state).energies)
         state = self.accounts.opened(state)
-        y = np.concatenate([np.zeros(self.nv), state.r, state.heats, state.totals])
-        entropies, freedoms = self.heats.entropies(state.heats), slice(self.nv, self.nv + self.n)
-        self._paper.check(state.q, state.r, entropies, lambda: self.rates(t, state.q, y)[freedoms])
+        self._paper.check(state.q, state.r, self.heats.entropies(state.heats), lambda: self.accelerations(state))
         if self.careful:
             self._without_repeated(state)
         return state

@@ -22,11 +22,9 @@ def heats_of(reduced: Reduced, theta: float) -> Heats:
         rows = table.arrays[1].reshape(-1, EntropyNode.real_width)[t.node >= 0]
         return rows[:, EntropyNode.c1.offset], rows[:, EntropyNode.c2.offset]
 
-    flows, sinks, owners, rubs = t.sink.T
+    flows, sinks = t.sink.T[:2]
     ends = np.full((len(reduced.made), 2), -1, dtype=np.int64)
     ends[flows, 1] = sinks
-    owner = np.arange(len(reduced.made))
-    owner[flows] = owners
     for component, one, two in t.conduction.tolist():
         ends[t.made_at[component]] = one, two
-    return Heats(reduced.entropies, t.node, laws, ends, flows[rubs > 0], theta, owner)
+    return Heats(reduced.entropies, t.node, laws, ends, theta)
