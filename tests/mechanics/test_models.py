@@ -10,7 +10,6 @@ from ephs.mechanics import (
     joint_pattern,
     mbs_pattern,
     rigid_body,
-    spring_damper,
     universal_joint,
 )
 from ephs.operad import Path
@@ -114,18 +113,6 @@ def test_a_universal_joint_is_two_revolutes_and_its_frame_is_massless():
     assert flat.distance(nested) <= 1e-13
     with pytest.raises(StructureError, match="coupling"):
         universal_joint(None, None, None, [[0.1, 0.1], [0.1, 0.2]])
-
-
-def test_a_spring_pulls_along_the_line_of_its_points():
-    spring = spring_damper([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 10.0, 0.5)
-    relation = spring.relation().at({"pe.q_r": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]})
-    names = [str(path) for path, _ in relation.ports]
-    basis = subspace_of(relation).basis
-    constant = basis[7 : 7 + 12] @ basis[-1] / (basis[-1] @ basis[-1])
-    pulls = dict(zip(names, np.split(constant, 2), strict=True))
-    # drawn from body 1 a wrench that pulls it to body 2 (z up), and the other way round; the frames are 2 m apart
-    assert np.allclose(pulls["p1"], [0, 0, 0, 0, 0, -15.0], atol=1e-10)
-    assert np.allclose(pulls["p2"], [0, 0, 0, 0, 0, 15.0], atol=1e-10)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Motions of mechanisms: the laws of every step, by the compiled natural method."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -192,23 +191,6 @@ def test_a_step_of_more_than_half_a_turn_does_not_end_well():
     case = next(c for c in CASES if c.name == "heavy-top")
     with pytest.raises(ephs.AuditError, match="accuracy"):
         ephs.simulate(case.scene(), 1.0, step=0.03)
-
-
-@pytest.mark.parametrize(
-    ("law", "error", "says"),
-    [
-        ((-1.5,), ephs.SceneError, r"joints\.j1\.motion: found a rate of -1, expected -1\.5"),
-        ((-1.0, -0.5), ephs.SimulationError, "check prescribed motions|no solution"),
-    ],
-)
-def test_contradictory_motions_are_refused(law, error, says):
-    """A four-bar of one freedom whose two cranks are told to turn at different rates, from the start or later."""
-    case = next(c for c in CASES if c.name == "four-bar-windows-1")
-    scene = case.scene()
-    laws = {"j0": (-1.0,), "j1": law}
-    told = {name: replace(scene.joints[name], motion=ephs.PolynomialMotion(of)) for name, of in laws.items()}
-    with pytest.raises(error, match=says):
-        ephs.simulate(replace(scene, joints={**scene.joints, **told}), 1.0, step=0.01)
 
 
 def test_functions_of_the_user_move_with_the_same_balances():
