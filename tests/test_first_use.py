@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import ephs
@@ -218,13 +217,6 @@ def test_slips_are_told_by_what_was_meant(slip):
     make, said = SLIPS[slip]
     with pytest.raises((ephs.SemanticsError, ephs.SimulationError, AttributeError), match=said):
         make()
-
-
-def test_a_capacity_begins_at_its_temperature():
-    """θ = c1/c2 exp(s/c2), 300 K at s = 0."""
-    one, two = lib.thermal_capacity(capacity=20.0, temperature=300.0), lib.thermal_capacity(c1=6000.0, c2=20.0)
-    assert one == two
-    assert one.energy_gradient({port: np.zeros(1) for port in one.reads})[0] == pytest.approx(300.0, rel=1e-15)
 
 
 @pytest.mark.parametrize(("seconds", "most"), [(4.0, 0), (60.0, 8), (3600.0, 18), (86400.0, 26)])

@@ -72,8 +72,7 @@ def drawn(seed: int) -> dict[str, Any]:
         law = {"stiffness": u(1.0, 20.0), "damping": u(0.0, 1.0)}
         out["tendons"] = {"tendon": {"bodies": on, "points": [point(body) for body in on], **law, **heat()}}
     if likely(0.4):
-        wrench = {"force": vector(r, 2.0), "moment": vector(r, 0.3), "follower": likely(0.5)}
-        out["loads"] = {"load": {"body": r.choice(bodies), **wrench}}
+        out["loads"] = load(r, bodies, 2.0)
     if likely(0.25):
         body, start = r.choice(bodies), vector(r, 0.5)
         ends = {"from": start, "to": [x + y for x, y in zip(start, vector(r, 0.5), strict=True)], "ends": [body]}
@@ -85,6 +84,18 @@ def drawn(seed: int) -> dict[str, Any]:
 
 def vector(r: Random, size: float) -> list[float]:
     return [r.uniform(-size, size) for _ in range(3)]
+
+
+def load(r: Random, bodies: list[str], size: float) -> dict[str, Any]:
+    """A load of forces up to a size on one of the bodies."""
+    wrench = {"force": vector(r, size), "moment": vector(r, 0.3), "follower": r.random() < 0.5}
+    return {"load": {"body": r.choice(bodies), **wrench}}
+
+
+def windings(r: Random) -> dict[str, float]:
+    """Numbers that every motor has."""
+    u = r.uniform
+    return {"constant": u(0.1, 1.0), "resistance": u(0.5, 2.0), "voltage": u(-3.0, 3.0), "gear": u(0.5, 2.0)}
 
 
 def _add_body(r: Random, out: dict[str, Any], i: int, heat: Any) -> None:
@@ -115,7 +126,7 @@ def _add_body(r: Random, out: dict[str, Any], i: int, heat: Any) -> None:
 def _add_machines(r: Random, out: dict[str, Any], single: list[str], heat: Any) -> None:
     u, likely = r.uniform, lambda part: r.random() < part
     if likely(0.4):
-        circuit = {"constant": u(0.1, 1.0), "resistance": u(0.5, 2.0), "voltage": u(-3.0, 3.0), "gear": u(0.5, 2.0)}
+        circuit = windings(r)
         stores = {"inductance": r.choice([0.0, u(0.05, 0.2)]), "inertia": r.choice([0.0, u(0.01, 0.1)])}
         out["motors"] = {"motor": {"joint": single[0], **circuit, **stores, **heat()}}
     if likely(0.3):

@@ -1,6 +1,5 @@
 """Results kept with scenes and systems change no number of a run: the next one, one beside it, one after changes."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 
@@ -163,12 +162,6 @@ def test_elements_that_read_motions_for_more_than_their_start_are_made_anew(monk
 def same_start(one, other):
     path = Path.of("springs.s.pe.q_r")
     return np.array_equal(initial_state(one)[path], initial_state(other)[path])
-
-
-def test_runs_side_by_side_share_what_is_kept():
-    scene, alone = shipped("four-bar"), ran(shipped("four-bar"), "rk87")
-    with ThreadPoolExecutor(4) as pool:
-        assert all(same(found, alone) for found in pool.map(lambda _: ran(scene, "rk87"), range(8)))
 
 
 def test_a_sweep_leaves_the_scene_as_it_is():

@@ -1,7 +1,5 @@
 """Bodies, joints and their composition: the patterns, and that they mean the equations of the literature."""
 
-import itertools
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,7 +10,6 @@ from ephs.mechanics import (
     joint_pattern,
     mbs_pattern,
     rigid_body,
-    spring_damper,
     universal_joint,
 )
 from ephs.operad import Path
@@ -21,7 +18,7 @@ from ephs.semantics.spaces import PAIRS, SE3, SO3xR3, pair
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
 from tests.numerics import seeds
-from tests.semantics.subspace import Subspace, subspace_of
+from tests.semantics.subspace import subspace_of
 
 few = settings(max_examples=10)
 THETA = Reference().temperature
@@ -83,58 +80,6 @@ def test_impossible_bodies_are_refused(arguments, key):
 # ---- joints ----------------------------------------------------------------------------------------------------
 
 
-def joint_by_hand(two, *, first=None):
-    """The interconnected joint as a relation on (u_r, ṡ; p₁.f, p₂.f; p₁.e, p₂.e; unit) with λ eliminated."""
-    d, to1, to2 = two.of.dim, two.to_c1 if first is None else first, two.to_c2
-    basis, mu, unit = two.of.basis, two.mu, 1.0
-    # unknowns: u_r, ṡ, f₁, f₂, e₁, e₂, λ, 1
-    at = np.cumsum([0, d, 1, 6, 6, 6, 6, 6, 1])
-    u_r, s, f1, f2, e1, e2, lam, one = (slice(a, b) for a, b in itertools.pairwise(at))
-    rows = []
-
-    def row(*terms):
-        block = np.zeros((next(m.shape[0] for _, m in terms), at[-1]))
-        for where, m in terms:
-            block[:, where] += m
-        rows.append(block)
-
-    row((one, two.spring[:, None] / unit), (lam, basis.T), (u_r, mu))
-    row((e1, to1), (e2, -to2), (u_r, basis))
-    row((f1, np.eye(6)), (lam, -two.to_c1.T))
-    row((f2, np.eye(6)), (lam, to2.T))
-    drag = two.mu @ two.u_r
-    row((s, np.eye(1)), (u_r, -drag[None, :] / THETA))  # at the base point's M
-    whole = Subspace.from_kernel(np.vstack(rows))
-    return whole.project([*range(at[6]), at[7]])
-
-
-@pytest.mark.parametrize("kind", PAIRS)
-@few
-@given(seed=seeds)
-def test_a_joint_means_its_equations(kind, seed):
-    two = TwoBodies.draw(kind, seed)
-    system = two.system.fillings[Path.of("joint")]
-    for route in ("flat", "nested"):
-        relation = system.relation(route=route).at(
-            {"pe.q_r": two.x}, efforts={Path.parse("mf"): np.append(two.u_r, 0.0)}
-        )
-        assert relation.dimension - 1 == 12
-        ours = _scaled(relation, two.of.dim)
-        assert ours.distance(joint_by_hand(two)) <= 1e-12
-
-
-def _scaled(relation, d):
-    """Coordinates (u_r, ṡ, f₁, f₂, e₁, e₂, 1) of a joint's relation, whose rates are sorted env.s, pe.q_r."""
-    n = 1 + d
-    order = [*range(1, n), 0, *range(n, n + 24)]
-    size = n + 25
-    move = np.zeros((size, size))
-    for i, j in enumerate(order):
-        move[i, j] = 1.0
-    move[-1, -1] = 1.0
-    return Subspace(move @ subspace_of(relation).basis)
-
-
 @pytest.mark.parametrize("kind", kinds())
 @few
 @given(seed=seeds)
@@ -168,18 +113,6 @@ def test_a_universal_joint_is_two_revolutes_and_its_frame_is_massless():
     assert flat.distance(nested) <= 1e-13
     with pytest.raises(StructureError, match="coupling"):
         universal_joint(None, None, None, [[0.1, 0.1], [0.1, 0.2]])
-
-
-def test_a_spring_pulls_along_the_line_of_its_points():
-    spring = spring_damper([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 10.0, 0.5)
-    relation = spring.relation().at({"pe.q_r": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]})
-    names = [str(path) for path, _ in relation.ports]
-    basis = subspace_of(relation).basis
-    constant = basis[7 : 7 + 12] @ basis[-1] / (basis[-1] @ basis[-1])
-    pulls = dict(zip(names, np.split(constant, 2), strict=True))
-    # drawn from body 1 a wrench that pulls it to body 2 (z up), and the other way round; the frames are 2 m apart
-    assert np.allclose(pulls["p1"], [0, 0, 0, 0, 0, -15.0], atol=1e-10)
-    assert np.allclose(pulls["p2"], [0, 0, 0, 0, 0, 15.0], atol=1e-10)
 
 
 @pytest.mark.parametrize(

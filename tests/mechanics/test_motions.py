@@ -1,6 +1,5 @@
 """Motions of mechanisms: the laws of every step, by the compiled natural method."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,7 +12,6 @@ from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.build import initial_state, scene_inputs, scene_system
-from ephs.mechanics.scene.model import frozen
 from ephs.semantics import Reference
 from ephs.semantics.meaning.step import step
 from ephs.semantics.spaces import PAIRS
@@ -22,7 +20,7 @@ from ephs.testing import mechanisms
 from tests.mechanics.mechanisms import on_ground
 from tests.methods import FIXED_OF_SCENES
 from tests.numerics import EPS
-from tests.scenes import SCENES
+from tests.scenes import of_all_scenes
 from tests.written import scene_of_text
 
 # what is slow is compiled once: the first example
@@ -177,7 +175,7 @@ def test_a_four_bar_passes_its_singular_configuration():
     assert sol.summary()["mobility"] == 1
 
 
-@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+@of_all_scenes
 def test_the_shipped_scenes_move(file):
     sol = ephs.simulate(ephs.load(file), 0.5, step=1e-3, audit="off")  # too long for digits of the top
     assert sol.energy_error.max() <= 1e-12
@@ -188,56 +186,11 @@ def test_the_shipped_scenes_move(file):
 # ---- reading motions -------------------------------------------------------------------------------------------
 
 
-@settings(calm, max_examples=15)
-@given(mechanisms())
-def test_reported_velocities_are_those_of_the_start(scene):
-    """Nothing is projected away where the state is consistent; rates and twists are what the scene gave."""
-    sol = ephs.simulate(scene, 0.01, step=0.01)
-    for name, body in scene.all_bodies():
-        assert np.abs(sol.body(name).twist[0] - body.twist).max() <= 1e-10 * max(1.0, np.abs(body.twist).max())
-    for name, j in scene.all_joints():
-        assert np.abs(sol.joint(name).rate[0] - j.rate).max(initial=0.0) <= 1e-9 * max(
-            1.0, np.abs(j.rate).max(initial=0.0)
-        )
-    assert sol.velocity_error.max() <= 1e-11
-
-
-def test_a_drive_accelerates_its_freedom_and_its_work_is_in_the_balance():
-    case = next(c for c in CASES if c.name == "revolute-chain-4")
-    scene = replace(case.scene(), world=replace(case.scene().world, gravity=frozen(np.zeros(3))))
-    name = next(iter(scene.joints))
-    for force in (0.5, lambda t: 0.5, lambda t, state: 0.5):
-        sol = ephs.simulate(scene, 0.05, step=0.001, inputs={f"joints.{name}": force})
-        assert sol.joint(name).rate[-1, 0] > 0.0
-        assert sol.work[-1] > 0.0
-        assert sol.energy_error.max() <= 1e-12
-        assert sol.work[-1] == pytest.approx(
-            0.5 * sol.joint(name).coordinate[-1, 0] - 0.5 * sol.joint(name).coordinate[0, 0], rel=1e-6
-        )
-
-
 def test_a_step_of_more_than_half_a_turn_does_not_end_well():
     """150 rad/s and 30 ms: steps are taken in halves, and their error is found."""
     case = next(c for c in CASES if c.name == "heavy-top")
     with pytest.raises(ephs.AuditError, match="accuracy"):
         ephs.simulate(case.scene(), 1.0, step=0.03)
-
-
-@pytest.mark.parametrize(
-    ("law", "error", "says"),
-    [
-        ((-1.5,), ephs.SceneError, r"joints\.j1\.motion: found a rate of -1, expected -1\.5"),
-        ((-1.0, -0.5), ephs.SimulationError, "check prescribed motions|no solution"),
-    ],
-)
-def test_contradictory_motions_are_refused(law, error, says):
-    """A four-bar of one freedom whose two cranks are told to turn at different rates, from the start or later."""
-    case = next(c for c in CASES if c.name == "four-bar-windows-1")
-    scene = case.scene()
-    laws = {"j0": (-1.0,), "j1": law}
-    told = {name: replace(scene.joints[name], motion=ephs.PolynomialMotion(of)) for name, of in laws.items()}
-    with pytest.raises(error, match=says):
-        ephs.simulate(replace(scene, joints={**scene.joints, **told}), 1.0, step=0.01)
 
 
 def test_functions_of_the_user_move_with_the_same_balances():

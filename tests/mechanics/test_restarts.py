@@ -8,7 +8,7 @@ from ephs.mechanics.scene.build import scene_inputs
 from ephs.solve.running.control import RTOL
 from tests.mechanics.test_twins import PIN, SCENE, TWINS, load  # noqa: F401 - a fixture
 from tests.numerics import EPS, largest
-from tests.scenes import SCENES
+from tests.scenes import SCENES, of_all_scenes
 
 STEP, STEPS = 1e-3, 10
 ONWARDS = ("natural",)
@@ -56,7 +56,7 @@ def test_runs_of_all_elements_go_on(name, load):  # noqa: F811 - the fixture
     assert goes_on(scene, "rk87") <= CONDITION * ROUNDING
 
 
-@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+@of_all_scenes
 def test_runs_of_all_scenes_go_on(file):
     assert goes_on(ephs.load(file), "rk54") <= CONDITION * ROUNDING
 

@@ -16,11 +16,12 @@ from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.solve.methods.collocation import radau as coefficients
-from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.embedded import embedded_radau
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
+from tests.methods import choosing
 from tests.numerics import largest
+from tests.oscillator import rubbed_oscillator
 from tests.scenes import model_of
 from tests.written import scene_of_text
 
@@ -126,10 +127,7 @@ def test_every_method_of_scenes_with_constant_steps_has_its_test():
 # ---- systems without bodies -------------------------------------------------------------------------------------
 
 MASS, SPRING, DRAG = 2.0, 3.0, 0.4
-SYSTEM = Pattern.from_text("q: displacement; p: momentum; s: entropy; pe(q); ke(p); pkc(q, p); mf(p, s); env(s)")(
-    pe=library.spring(k=SPRING), ke=library.point_mass(m=MASS), pkc=library.pkc(), mf=library.friction(d=DRAG),
-    env=library.environment(),
-)  # fmt: skip
+SYSTEM = rubbed_oscillator(SPRING, MASS, DRAG)
 LINKED = Pattern.from_text(
     "q: displacement; p: momentum; p2: momentum; pe(q); ke(p); ke2(p=p2); pkc(q, p); link(p, p2)"
 )(
@@ -178,7 +176,7 @@ def test_methods_have_the_orders_that_are_said_of_them():
 
 def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
     for rtol, h, power in ((1e-2, 0.05, 4.0), (1e-9, 0.4, 8.0), (1e-6, 0.1, 6.0)):
-        control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, np.inf, None)
+        control = choosing(rtol)
         method, _ = METHODS["radau"].make(Setting(problem_of_system(SYSTEM, START), 0.0, control, {}))
         start = method.start(0.0, h)
         one, two = (method.step(start, part * h) for part in (1.0, 0.5))
@@ -203,7 +201,7 @@ def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
 @pytest.mark.parametrize(("rtol", "count"), [(1e-2, 3), (1e-6, 5), (1e-9, 7)])
 @pytest.mark.parametrize("h", [0.2, 0.5])
 def test_the_estimate_of_radau_is_the_filtered_defect_of_the_embedded_method(h, rtol, count):
-    control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, np.inf, None)
+    control = choosing(rtol)
     problem = problem_of_system(LINKED, START | {"ke2.p": -1.1})
     method, _ = METHODS["radau"].make(Setting(problem, 0.0, control, {}))
     assert not any(method.counts.values())

@@ -57,32 +57,6 @@ def test_wrenches_are_those_of_the_descriptor_form(scene, driven, seed):
         assert np.nanmax(np.abs(found - expected), initial=0.0) < 1e-9 * scale
 
 
-def test_a_prescribed_motion_takes_the_force_that_it_needs():
-    """A wheel with an eccentric weight, turned evenly: the moment about its axis is what holds the weight up."""
-    text = """
-    format = 1
-    name = "wheel"
-    [bodies.wheel]
-    mass = 2.0
-    inertia = [0.1, 0.1, 0.1]
-    position = [0.3, 0.0, 0.0]
-    velocity = [0.0, 0.6, 0.0]
-    angular_velocity = [0.0, 0.0, 2.0]
-    [world]
-    gravity = [0.0, -10.0, 0.0]
-    [joints.pin]
-    type = "revolute"
-    bodies = ["ground", "wheel"]
-    at = [0.0, 0.0, 0.0]
-    axis = [0.0, 0.0, 1.0]
-    motion = { rate = 2.0 }
-    """
-    sol = ephs.simulate(scene_of_text(text), 1.0, step=0.01)
-    wrench = sol.joint("pin").wrench
-    assert np.allclose(wrench[:, 2], 20.0 * 0.3 * np.cos(2.0 * sol.t), atol=1e-10)
-    assert np.allclose(wrench[0, 3:], [-2.0 * 0.3 * 4.0, 20.0, 0.0], atol=1e-10)
-
-
 @pytest.mark.parametrize("kind", ["revolute", "cylindrical", "spherical"])
 @pytest.mark.filterwarnings("ignore::ephs.SceneWarning")
 def test_wrenches_of_bodies_with_a_negative_principal_moment_are_those_of_the_descriptor_form(kind):

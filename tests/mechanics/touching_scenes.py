@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
-from tests.mechanics.drawn_scenes import FREEDOMS, vector
+from tests.mechanics.drawn_scenes import FREEDOMS, load, vector, windings
 
 Shape = Mapping[str, Any]
 CORNERS = np.array([[-0.08, -0.06, -0.05], [0.09, -0.05, -0.05], [0.0, 0.1, -0.05], [0.0, 0.0, 0.11]])
@@ -172,9 +172,7 @@ def _add_forces(r: Random, out: dict[str, Any]) -> None:
         law = {"stiffness": u(10.0, 100.0), "length": u(0.1, 0.5), "damping": u(0.0, 1.0)}
         out["springs"] = {"spring": ends | law}
     if likely(0.3):
-        wrench = {"force": vector(r, 5.0), "moment": vector(r, 0.3), "follower": likely(0.5)}
-        out["loads"] = {"load": {"body": r.choice(bodies), **wrench}}
+        out["loads"] = load(r, bodies, 5.0)
     single = [name for name, joint in out["joints"].items() if FREEDOMS[joint["type"]] == 1]
     if single and likely(0.4):
-        circuit = {"constant": u(0.1, 1.0), "resistance": u(0.5, 2.0), "voltage": u(-3.0, 3.0), "gear": u(0.5, 2.0)}
-        out["motors"] = {"motor": {"joint": single[0], **circuit, "inductance": u(0.05, 0.2)}}
+        out["motors"] = {"motor": {"joint": single[0], **windings(r), "inductance": u(0.05, 0.2)}}

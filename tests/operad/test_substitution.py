@@ -24,30 +24,6 @@ def test_damped_oscillator(models):
     assert flat == models.DAMPED.substitute({"osc": models.OSCILLATOR})
 
 
-def test_two_bodies_on_a_joint(models):
-    flat = models.MBS.substitute(b1=models.BODY, b2=models.BODY, j=models.JOINT)
-    assert names(flat.junctions) == {"p1", "p2", "b1.q", "b2.q", "j.p_j1", "j.p_j2", "j.p_r", "j.q_r", "j.s"}
-    inner = ("pe", "pkc", "ke", "lp")
-    joint = ("hc", "o1", "o2", "pe", "pkc", "mf", "env")
-    assert names(flat.boxes) == {f"{b}.{x}" for b in ("b1", "b2") for x in inner} | {f"j.{x}" for x in joint}
-    assert (len(flat.junctions), len(flat.boxes)) == (9, 15)
-    assert {str(p): str(w) for p, w in flat.boxes["j.hc"].ports.items()} == {
-        "q_r": "~j.q_r",
-        "p_j1": "j.p_j1",
-        "p_j2": "j.p_j2",
-        "p_r": "j.p_r",
-    }
-    assert {(str(b), str(p)) for b, box in flat.boxes.items() for p, w in box.ports.items() if str(w) == "p1"} == {
-        ("b1.pkc", "p"),
-        ("b1.ke", "p"),
-        ("b1.lp", "p"),
-        ("j.o1", "p1"),
-    }
-    assert not flat.links and not flat.lint() and not flat.interface
-    with pytest.raises(KeyError):
-        flat.boxes["b1"]
-
-
 def absorbed(upper: Pattern, box: str, lower: Pattern) -> Pattern:
     """The naive substitution: an outer state port is absorbed like an outer power port."""
     powered = {p: junction(j.quantity, j.exposed) for p, j in lower.junctions.items()}

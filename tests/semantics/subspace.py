@@ -92,3 +92,11 @@ def dirac(skew: Array, constraint: Array) -> Subspace:
     rows = constraint / np.linalg.norm(constraint, axis=1, keepdims=True)
     kernel = np.block([[-np.eye(n), skew, rows.T], [np.zeros((k, n)), rows, np.zeros((k, k))]])
     return Subspace.from_kernel(kernel).project(range(2 * n))
+
+
+def assert_dirac(skew: Array, constraint: Array) -> None:
+    """The flows f = L e + Cᵀ λ at C e = 0 have half of all dimensions, and make and lose no power."""
+    n, found = len(skew), dirac(skew, constraint)
+    form = np.kron([[0.0, 1.0], [1.0, 0.0]], np.eye(n))
+    assert found.dimension == n
+    assert np.abs(found.basis.T @ form @ found.basis).max(initial=0.0) <= 1e-13

@@ -9,15 +9,11 @@ from hypothesis import strategies as st
 import ephs
 from ephs import library as lib
 from ephs.testing import systems
-
-HEATED = ephs.Pattern.from_text("q: displacement; p: momentum; s: entropy; pe(q); ke(p); pkc(q, p); mf(p, s); tc(s)")
+from tests.oscillator import rubbed_oscillator
 
 
 def test_the_books_at_a_state_are_those_of_a_solution_there():
-    system = HEATED(
-        pe=lib.spring(k=2.0), ke=lib.point_mass(m=0.5), pkc=lib.pkc(), mf=lib.friction(d=0.3),
-        tc=lib.thermal_capacity(c1=300.0, c2=2.0),
-    )  # fmt: skip
+    system = rubbed_oscillator(2.0, 0.5, 0.3, env=lib.thermal_capacity(c1=300.0, c2=2.0))
     sol = ephs.simulate(system, 1.0, initial={"pe.q": 1.0}, step=0.1)
     for i in range(len(sol)):
         state = {path: values[i] for path, values in sol.states.items()}
@@ -31,7 +27,7 @@ def test_the_books_at_a_state_are_those_of_a_solution_there():
         for path, account in found.items():
             assert math.isclose(account.energy, sol.ledgers.storages[path][i], rel_tol=1e-12, abs_tol=1e-12)
     assert list(map(str, system.ledger.producers)) == ["mf"]
-    assert set(map(str, system.ledger.storages)) == {"pe", "ke", "tc"}
+    assert set(map(str, system.ledger.storages)) == {"pe", "ke", "env"}
     assert "entropy is made by mf" in str(system.ledger)
 
 
@@ -45,7 +41,4 @@ def test_flattening_changes_no_book(data):
 
 def test_an_unknown_state_is_refused():
     with pytest.raises(ephs.AssemblyError, match="nobody"):
-        HEATED(
-            pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc(), mf=lib.friction(d=1.0),
-            tc=lib.thermal_capacity(c1=300.0, c2=1.0),
-        ).ledger({"nobody": 1.0})  # fmt: skip
+        rubbed_oscillator().ledger({"nobody": 1.0})

@@ -6,8 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern
-from ephs import library as lib
 from ephs import quantity as Q
 from ephs.operad import Path
 from ephs.semantics import Reference
@@ -16,18 +14,15 @@ from ephs.semantics.primitives.behaviour import GRADIENTS, NaturalBehaviour
 from ephs.semantics.systems.laws import random_probe
 from ephs.testing import systems
 from tests.numerics import EPS, largest
+from tests.oscillator import rubbed_oscillator
 
 REFERENCE = Reference()
 K, CUBIC, M, D = 1.0, 2.0, 1.3, 0.4
 ROUNDING = EPS
 
-DUFFING = Pattern.from_text("q: displacement; p: momentum; s: entropy; pe(q); ke(p); pkc(q, p); mf(p, s); env(s)")(
-    pe=ephs.storage({"q": Q.displacement}, lambda q: 0.5 * K * q**2 + 0.25 * CUBIC * q**4),
-    ke=lib.point_mass(m=M),
-    pkc=lib.pkc(),
-    mf=lib.friction(d=D),
-    env=lib.environment(),
-)  # fmt: skip
+DUFFING = rubbed_oscillator(
+    m=M, d=D, pe=ephs.storage({"q": Q.displacement}, lambda q: 0.5 * K * q**2 + 0.25 * CUBIC * q**4)
+)
 START = np.array([1.0, 0.5])
 
 

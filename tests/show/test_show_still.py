@@ -3,7 +3,6 @@
 from xml.etree import ElementTree
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
@@ -15,10 +14,10 @@ from ephs.show.motions.sketch import sketch
 from ephs.show.motions.solids import Solid, coarse
 from ephs.show.motions.stage import stage_of
 from ephs.show.motions.still import HIGHEST, WIDTH, still_svg
-from tests.scenes import SCENES
+from tests.scenes import SCENES, of_all_scenes
 
 
-@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+@of_all_scenes
 def test_an_svg_has_every_mark_and_every_name_within_its_frame(file):
     scene = ephs.load(file)
     poses = {name: np.asarray(body.pose) for name, body in scene.all_bodies()}

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import ephs
-from ephs import quantity as Q
-from ephs.semantics import library
 from ephs.solve.running.control import Symmetric
 from examples.failing import scene
 from tests.numerics import EPS
+from tests.oscillator import rubbed_oscillator
+from tests.semantics.zoo import drag
 
 RATE, ENERGY, WARM = 100.0, 5000.0, 300.0
 
@@ -99,27 +99,14 @@ def test_friction_that_grows_as_a_power_below_one_starts_from_rest(power, method
     """q″ = −q − |q′|^a q′ from rest at 1; with a < 0 there is no force at rest, and the component is named."""
 
     def system(power):
-        places = {"q": Q.displacement, "p": Q.momentum, "s": Q.entropy}
-        pattern = ephs.Pattern(
-            junctions={name: ephs.junction(of) for name, of in places.items()},
-            boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}, "d": {"p": "p", "s": "s"},
-                   "env": {"s": "s"}},
-        )  # fmt: skip
-
-        def matrix(p, s):
-            return abs(p) ** power * np.array([[s, -p], [-p, p * p / s]])
-
-        return ephs.System.of(pattern, {
-            "pe": library.spring(k=1.0).with_initial({"q": 1.0}), "ke": library.point_mass(m=1.0),
-            "pkc": library.pkc(), "d": ephs.irreversible({"p": Q.momentum, "s": Q.entropy}, matrix),
-            "env": library.environment(),
-        })  # fmt: skip
+        return rubbed_oscillator(mf=drag(lambda p, s: abs(p) ** power)())
 
     options = {"step": 5e-3} if method == "natural4" else {"rtol": 1e-9}
+    options["initial"] = {"pe.q": 1.0}
     sol = ephs.simulate(system(power), 1.0, method=method, **options)
     found = solve_ivp(
         lambda t, y: [y[1], -y[0] - abs(y[1]) ** power * y[1]], (0.0, 1.0), [1.0, 0.0], rtol=1e-11, atol=1e-12
     )
     assert sol["ke.p"][-1] == pytest.approx(found.y[1, -1], rel=1e-7)
-    with pytest.raises(ephs.SimulationError, match=r"at d: .* a flow that is not a finite number"):
+    with pytest.raises(ephs.SimulationError, match=r"at mf: .* a flow that is not a finite number"):
         ephs.simulate(system(-0.5), 1.0, method=method, **options)

@@ -143,13 +143,3 @@ def test_steps_of_conduction_alone_need_one_iteration_and_keep_the_energy():
     node = library.thermal_capacity(c1=293.15 * 10.0, c2=10.0)
     control = run(pattern(n0_0=node, other=node, link=RADIATING), rtol=1e-6)
     assert control.stats["iterations"] > control.stats["steps"]
-
-
-def test_two_capacities_come_to_one_temperature_exactly():
-    """The difference of their temperatures decays as exp(−2 h t / C)."""
-    node = library.thermal_capacity(capacity=10.0, temperature=293.15)
-    pattern = Pattern.from_text("a: entropy; b: entropy; n0_0(s=a); two(s=b); link(s1=a, s2=b)")
-    sol = run(pattern(n0_0=node, two=node, link=library.heat_transfer(h=1.5)), rtol=1e-9, atol=1e-12)
-    difference = sol.temperature("n0_0") - sol.temperature("two")
-    expected = difference[0] * np.exp(-2.0 * 1.5 * sol.t / 10.0)
-    assert largest(difference - expected) <= 1e-7 * difference[0]

@@ -92,15 +92,6 @@ def test_every_variable_has_a_unit_and_every_axis_names():
     assert (data["t"].attrs["units"], data["heat"].attrs["units"]) == ("s", "J")
 
 
-def test_others_read_the_file_with_xarray_alone(tmp_path):
-    sol = ephs.simulate(shipped("four-bar"), 0.01, step=0.001)
-    sol.save(tmp_path / "sol.nc", wrenches=True)
-    with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
-        name = next(iter(sol.scene.bodies))
-        assert np.array_equal(data["body_position"].sel(body=name), sol.body(name).position)
-        assert data["joint_wrench"].attrs["units"] == "N m, N m, N m, N, N, N"
-
-
 def test_a_file_that_xarray_writes_again_holds_the_same_solution(tmp_path, damped):
     for model, options in ((damped, {"initial": {"osc.pe.q": 1.0}}), (shipped("slider-crank"), {})):
         sol = ephs.simulate(model, 0.5, rtol=1e-6, **options)

@@ -120,32 +120,6 @@ def test_a_prescribed_effort_holds_and_its_work_is_in_the_balance(driven):
     assert np.allclose(sol.work, 0.75 * sol["pe.q"] ** 2, rtol=0.0, atol=1e-13)
 
 
-def test_a_python_function_that_raises_stops_the_run_and_loses_nothing():
-    def energy(q):
-        if q > 10.0:
-            raise ZeroDivisionError("off the table")
-        return 0.0
-
-    system = free_oscillator(pe=ephs.storage({"q": Q.displacement}, energy))
-    with pytest.raises(ephs.SimulationError, match=r"pe") as caught:
-        ephs.simulate(system, 100.0, initial={"ke.p": 1.0}, step=0.5)
-    assert isinstance(caught.value.__cause__, ZeroDivisionError)
-    partial = caught.value.partial
-    assert 9.0 < partial.t[-1] == caught.value.time < 10.5
-    assert partial["pe.q"][-1] == pytest.approx(partial.t[-1])
-
-
-def test_a_run_that_is_interrupted_keeps_what_it_has(damped):
-    def stop(t, _until, _stats):
-        if t > 0.5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(ephs.Interrupted) as caught:
-        ephs.simulate(damped, 1e6, initial=START, step=0.01, progress=stop)
-    whole = ephs.simulate(damped, float(caught.value.partial.t[-1]), initial=START, step=0.01)
-    assert np.array_equal(caught.value.partial["osc.pe.q"], whole["osc.pe.q"])
-
-
 def test_progress_is_told_and_the_times_ascend(damped):
     seen = []
     ephs.simulate(

@@ -135,10 +135,8 @@ def test_a_system_goes_on_too(copies, tmp_path, damped):
             again = simulate(damped, options, journal=copy)
             assert same(again, whole) and counts(again) == counts(whole)
         found = ephs.load_solution(middle, damped)
-        assert same(found, simulate(damped, options | {"until": whole.t[-1], "save_at": found.t})) or (
-            np.array_equal(found.t, whole.t[: len(found)])
-            and np.array_equal(found["osc.pe.q"], whole["osc.pe.q"][: len(found)])
-        )
+        assert np.array_equal(found.t, whole.t[: len(found)])
+        assert np.array_equal(found["osc.pe.q"], whole["osc.pe.q"][: len(found)])
 
 
 AGAIN = [

@@ -122,20 +122,6 @@ def test_only_what_depends_on_a_lost_derivative_is_lost():
     assert np.allclose(sol.port("b").flow[:, 0], 3.0 * np.cos(sol.t), atol=1e-6)
 
 
-def test_an_effort_that_turns_at_an_instant_has_no_voltage_there():
-    sol = led(
-        lib.inductor(l=2.0),
-        lambda t: abs(t - 0.5),
-        1.0,
-        save_at=np.linspace(0.0, 1.0, 5),
-        initial={"coil.b": 1.0},
-        jumps=[0.5],
-    )
-    flow = sol.port("b").flow[:, 0]
-    assert np.isnan(flow[2])
-    assert np.allclose(flow[[0, 1, 3, 4]], [-1.5, -1.75, 2.25, 2.5], atol=1e-6)
-
-
 def test_a_joint_that_a_function_leads_has_the_rates_and_wrenches_of_its_law():
     scene = scene_of_text(ARM)
     law, inertia = scene.joint("pin").motion, 0.3 + 2.0 * 0.5**2

@@ -4,8 +4,8 @@ import pytest
 from scipy.special import beta
 
 import ephs
-from ephs import Pattern, library
 from ephs import quantity as Q
+from tests.oscillator import rubbed_oscillator
 from tests.semantics.zoo import drag
 from tests.written import scene_of_text
 
@@ -44,25 +44,19 @@ METHODS = [("radau", {}), ("rk87", {}), ("natural4", {"step": 0.01}), ("natural"
 def test_springs_of_any_power_swing_from_where_their_derivatives_are_roots(method, steps, power):
     """½ p² + |q|ᵃ from q = 0: p = 0 after a quarter of a period, at |q|ᵃ = ½. A drag as |v|ᵇ v begins at rest, too."""
     quarter = 0.5 ** (1.0 / power) * beta(1.0 / power, 0.5) / power
-    found = ephs.simulate(swinging(power, 0.0), quarter, initial={"mass.p": 1.0}, method=method, **steps)
+    found = ephs.simulate(swinging(power, 0.0), quarter, initial={"ke.p": 1.0}, method=method, **steps)
     order = 1e-3 if method == "natural" else 1e-5
-    assert abs(found["mass.p"][-1]) < order and abs(found["spring.q"][-1] - 0.5 ** (1.0 / power)) < order
+    assert abs(found["ke.p"][-1]) < order and abs(found["pe.q"][-1] - 0.5 ** (1.0 / power)) < order
     dragged = swinging(2.0, 0.5 * power)
     one, other = (
-        ephs.simulate(dragged, 1.0, initial={"spring.q": 1.0}, method=name, **more)
+        ephs.simulate(dragged, 1.0, initial={"pe.q": 1.0}, method=name, **more)
         for name, more in ((method, steps), ("rk87", {"rtol": 1e-10, "atol": 1e-12}))
     )
-    assert abs(one["mass.p"][-1] - other["mass.p"][-1]) < order
+    assert abs(one["ke.p"][-1] - other["ke.p"][-1]) < order
 
 
 def swinging(power, b):
     """A mass on a spring of the energy |q|ᵃ, with a drag as |v|ᵇ v if b > 0."""
-    pattern = Pattern.from_text(
-        "q: displacement; p: momentum; s: entropy; spring(q); mass(p); turn(q, p); drag(p, s); air(s)"
-    )
     coefficient = 0.5 if b else 0.0
-    return pattern(
-        spring=ephs.storage({"q": Q.displacement}, lambda q: abs(q) ** power),
-        mass=library.point_mass(m=1.0), turn=library.pkc(), air=library.environment(),
-        drag=drag(lambda p, s: coefficient * abs(p) ** b)(),
-    )  # fmt: skip
+    spring = ephs.storage({"q": Q.displacement}, lambda q: abs(q) ** power)
+    return rubbed_oscillator(pe=spring, mf=drag(lambda p, s: coefficient * abs(p) ** b)())

@@ -6,8 +6,8 @@ import pytest
 import ephs
 from ephs import Pattern
 from ephs import library as lib
-from ephs import quantity as Q
 from ephs.solve.methods import paced, radau
+from tests.semantics.zoo import drag
 
 POWERS, STIFFNESSES = (1.5, 2.0, 3.0), (1e-3, 1.0, 1e4)
 METHODS = {
@@ -24,14 +24,9 @@ ORDERS = {"radau": 5, "natural": 2}
 def damped(n, k, *, pushed=False):
     """A spring on a damper of power n; ``pushed``: by a force at an outer port, too."""
 
-    def dissipation(p, s):
-        g = abs(p) ** (n - 1.0)
-        return np.array([[g * s, -g * p], [-g * p, g * p * p / s]])
-
-    damper = ephs.irreversible({"p": Q.momentum, "s": Q.entropy}, dissipation)
     momentum = "p: momentum, exposed" if pushed else "p: momentum"
     return Pattern.from_text(f"q: displacement; {momentum}; s: entropy; k(q); g(q, p); d(p, s); env(s)")(
-        k=lib.spring(k=k), g=lib.pkc(), d=damper, env=lib.environment()
+        k=lib.spring(k=k), g=lib.pkc(), d=drag(lambda p, s: abs(p) ** (n - 1.0))(), env=lib.environment()
     )
 
 

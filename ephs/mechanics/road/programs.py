@@ -145,16 +145,6 @@ class Sweeps:
         self.width = self._layout.width
         self.program = Program(_name(kind, general=general), **entries)
 
-    def tangent(self, directions: int = 1) -> Program:
-        """The program of ``accelerations`` with exact derivatives along directions.
-
-        Memory, q, r, force and rate come with an array of their slopes each; those of quaternions are the quaternions'.
-        """
-        entry = self.program.entries["accelerations"]
-        return Program(
-            "tangents", accelerations=entry.tangent("memory", "q", "r", "force", "rate", directions=directions)
-        )
-
     def _survey(self, entries: dict[str, Entry], survey: Survey) -> None:
         self._states = _SurveyedMemory(survey.memory())
         for entry in entries.values():

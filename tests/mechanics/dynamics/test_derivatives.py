@@ -168,24 +168,6 @@ def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
     close(np.vstack(linear.action(q, r, s, 1.0)), difference(action, 2 * n))
 
 
-@settings(max_examples=20)
-@given(drawn=moving())
-def test_forward_columns_are_inverse_columns_solved(drawn):
-    """Two ways to one Jacobian, both exact: to rounding times the condition of the mass matrix."""
-    scene, model, state, _ = drawn
-    equations = equations_of(scene)
-    linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
-    n = equations.n
-    assume(n and not model.cut and not equations.driven.size)
-    a = linear.forward(q, r, s)
-    forward = linear.columns(solve=True)
-    linear.inverse(q, r, s, a)
-    inverse, mass = linear.columns(solve=False), equations.mass(q, r)
-    assert np.array_equal(forward[n:], inverse[n:])
-    size = max(1.0, largest(inverse), largest(mass) * largest(forward[:n]))
-    assert largest(mass @ forward[:n] + inverse[:n]) <= 10 * EPS * np.linalg.cond(mass) * size
-
-
 @settings(max_examples=10)
 @given(drawn=moving())
 def test_columns_add_up_along_any_direction(drawn):

@@ -10,7 +10,7 @@ from ephs.semantics.spaces.rank import EXPLICIT
 from tests.mechanics.dynamics.drawn import moving
 from tests.methods import FIXED_OF_SCENES
 from tests.numerics import EPS, largest, slope
-from tests.scenes import SCENES, shipped
+from tests.scenes import of_all_scenes, shipped
 from tests.written import scene_of_text
 
 
@@ -119,7 +119,7 @@ def test_a_step_is_the_first_of_a_simulation_and_changes_no_state(drawn, method)
         assert largest(sol.body(name).velocity[-1] - body.velocity) <= 1e-9 * max(1.0, largest(body.velocity))
 
 
-@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+@of_all_scenes
 def test_shipped_scenes(file):
     scene = ephs.load(file)
     model = ephs.dynamics(scene)

@@ -20,7 +20,9 @@ def trees(draw, kinds):
     scene = draw(mechanisms(max_bodies=6, kinds=kinds, loops=False, friction=False, springs=False, heat=False))
     dynamics = ephs.dynamics(scene)
     assume(dynamics.layout.n > 0)
-    return dynamics, PinModel(scene, dynamics), np.random.default_rng(draw(seeds))
+    state, other = dynamics.state0, PinModel(scene, dynamics)
+    q, v = other.configuration(dynamics, state), other.vector(flat(dynamics, state.rates))
+    return dynamics, other, state, q, v, np.random.default_rng(draw(seeds))
 
 
 def alike(found, expected, scale=1.0):
@@ -46,9 +48,8 @@ FAMILIES = pytest.mark.parametrize("kinds", [*((kind,) for kind in KINDS), tuple
 @settings(max_examples=15)
 @given(data=st.data())
 def test_pinocchio_computes_the_same(kinds, data):
-    dynamics, other, rng = data.draw(trees(kinds))
-    state, n, model = dynamics.state0, dynamics.layout.n, other.model
-    q, v = other.configuration(dynamics, state), other.vector(flat(dynamics, state.rates))
+    dynamics, other, state, q, v, rng = data.draw(trees(kinds))
+    n, model = dynamics.layout.n, other.model
     tau, a = rng.standard_normal((2, n))
     mass = other.matrix(whole(pin.crba(model, other.data, q)))
     alike(dynamics.mass_matrix(state), mass)
@@ -68,9 +69,8 @@ def test_pinocchio_computes_the_same(kinds, data):
 @settings(max_examples=15)
 @given(data=st.data())
 def test_pinocchio_differentiates_the_same(kinds, data):
-    dynamics, other, rng = data.draw(trees(kinds))
-    state, n, model = dynamics.state0, dynamics.layout.n, other.model
-    q, v = other.configuration(dynamics, state), other.vector(flat(dynamics, state.rates))
+    dynamics, other, state, q, v, rng = data.draw(trees(kinds))
+    n, model = dynamics.layout.n, other.model
     tau = rng.standard_normal(n)
     exact = dynamics.derivatives(state, dynamics.layout.by_joint(tau))
     by_q, by_v, by_force = pin.computeABADerivatives(model, other.data, q, v, other.vector(tau))

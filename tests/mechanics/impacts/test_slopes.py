@@ -5,6 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.shapes.pairs import ROUNDED
+from tests.mechanics.impacts.test_hard_contact import inclined
 from tests.written import scene_of_text
 
 G, MASS, RADIUS, LENGTH = 9.81, 2.0, 0.1, 0.3
@@ -44,8 +45,7 @@ def product(one, other):
 
 def sloped(theta, ground, shape, height, inertia, friction, turn=(1.0, 0.0, 0.0, 0.0)):
     """A scene with a body whose centre is so high above a slope that falls along x; its directions down and up."""
-    tilt = [float(np.cos(theta / 2.0)), 0.0, float(np.sin(theta / 2.0)), 0.0]
-    up, down = np.array([np.sin(theta), 0.0, np.cos(theta)]), np.array([np.cos(theta), 0.0, -np.sin(theta)])
+    tilt, up, down = inclined(theta)
     kind, depth = FLAT[ground]
     text = HEAD + GROUND.format(name="slope", shape=kind, at=(-depth * up).tolist(), turn=tilt)
     text += BODY.format(

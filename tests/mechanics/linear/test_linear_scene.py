@@ -2,8 +2,6 @@
 
 import json
 from dataclasses import replace
-from importlib.util import find_spec
-from pathlib import Path as File
 
 import mujoco
 import numpy as np
@@ -20,7 +18,6 @@ from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.continuous import Continuous
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
-from tests.mechanics.dynamics.mujoco_scenes import accelerations, joints, stripped
 from tests.numerics import jacobian, largest, slope
 from tests.scenes import shipped
 from tests.written import scene_of_text
@@ -156,38 +153,6 @@ def test_a_moving_tree_linearises_as_its_flow_does(drawn):
     assert largest(found.A - expected) < 1e-6 * max(1.0, largest(expected))
 
 
-@pytest.mark.filterwarnings("ignore::ephs.ModelWarning")
-def test_mujoco_differentiates_a_robot_alike():
-    """The accelerations of half_cheetah that mj_forward computes, differenced by all coordinates and rates."""
-    file = File(find_spec("gymnasium").submodule_search_locations[0]) / "envs/mujoco/assets/half_cheetah.xml"
-    model = stripped(mujoco.MjModel.from_xml_path(str(file)))
-    data, scene, rng = mujoco.MjData(model), ephs.load(file), np.random.default_rng(4)
-    q, v = rng.uniform(-0.5, 0.5, model.nq), rng.uniform(-1.0, 1.0, model.nv)
-    names = [name for name, *_ in joints(model)]
-    dynamics = ephs.dynamics(scene)
-    state = dynamics.state(dict(zip(names, q, strict=True)), dict(zip(names, v, strict=True)))
-    found = ephs.linearize(scene, state, inputs=[f"joints.{name}" for name in names])
-
-    def acceleration(dq, dv, force):
-        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = model.qpos0 + q + dq, v + dv, force
-        mujoco.mj_forward(model, data)
-        a = accelerations(model, data)
-        return np.array([a[name][0] for name in names])
-
-    n, unit = model.nv, np.eye(model.nv)
-
-    def column(i, of):
-        return extrapolated(lambda h: acceleration(*(h * (kind == of) * unit[i] for kind in range(3))))
-
-    blocks = [np.column_stack([column(i, of) for i in range(n)]) for of in range(3)]
-    order = [found.states.index(f"joints.{name}.coordinate") for name in names]
-    rates = [found.states.index(f"joints.{name}.rate") for name in names]
-    for expected, matrix in zip(
-        blocks, (found.A[np.ix_(rates, order)], found.A[np.ix_(rates, rates)], found.B[rates]), strict=True
-    ):
-        assert largest(matrix - expected) < 1e-7 * largest(expected)
-
-
 def test_forces_wrenches_and_markers_push_as_the_motion_says():
     scene = shipped("four-bar")
     scene = replace(scene, markers={"tip": Marker(body="coupler", at=[0.1, 0.2, 0.0]).called("tip")})
@@ -207,34 +172,6 @@ def test_forces_wrenches_and_markers_push_as_the_motion_says():
 
 
 # ---- closed forms ------------------------------------------------------------------------------------------------
-
-
-def test_a_spring_loaded_four_bar_swings_as_its_energy_says():
-    """ω² = V''/M along the single freedom, from energies alone."""
-    scene = varied(shipped("four-bar"), {"joints.main.drive": 0.0, "joints.main.friction": 0.0,
-                   "joints.pivot.friction": 0.0, "joints.knee.stiffness": 30.0})  # fmt: skip
-    rest = ephs.equilibrium(scene).model
-    found = ephs.linearize(rest, inputs=["joints.main"])
-    (mode,) = found.modes
-    angle = rest.joint("main").coordinate
-
-    def at(d, rate=0.0):
-        model = ephs.dynamics(rest.with_state({"main": angle + d}, {"main": [rate]}, adjust=True))
-        return model.energies(model.state0)
-
-    slope = extrapolated(lambda d: extrapolated(lambda e: at(d + e).potential, 0.02), 0.02)
-    omega = np.sqrt(slope / (2.0 * at(0.0, 1.0).kinetic))
-    assert mode.eigenvalue.real == 0.0 and mode.eigenvalue.imag == pytest.approx(omega, rel=1e-7)
-    assert mode.frequency == pytest.approx(omega / (2.0 * np.pi), rel=1e-7) and mode.damping == 0.0
-
-
-def test_a_heavy_body_on_a_ball_joint_swings_like_a_pendulum():
-    scene = ephs.equilibrium(shipped("heavy-top")).model
-    body, arm = scene.body("top"), np.linalg.norm(scene.joint("tip").frame2[4:])
-    omega = np.sqrt(body.mass * 9.81 * arm / (body.inertia[0, 0] + body.mass * arm**2))
-    values = ephs.linearize(scene).eigenvalues
-    swinging = values[np.abs(values) > 1e-6]
-    assert largest(np.abs(swinging.imag) - omega) < 1e-9 * omega and np.all(swinging.real == 0.0)
 
 
 # ---- laws --------------------------------------------------------------------------------------------------------

@@ -160,12 +160,6 @@ def test_a_spring_settles_under_its_load():
     assert values["osc.pe.q"] == pytest.approx(2.0, rel=1e-12) and abs(values["osc.ke.p"]) < 1e-12
 
 
-def test_what_only_falls_has_no_equilibrium():
-    falling = oscillator(pe=ephs.storage({"q": ephs.quantity.displacement}, lambda q: -9.81 * q))
-    with pytest.raises(ephs.SimulationError, match="no state found in which nothing moves"):
-        ephs.equilibrium(falling)
-
-
 @pytest.mark.parametrize(
     ("keys", "what"),
     [({"inputs": {"p": {"effort": 0.0}}}, "derivative"), ({"inputs": {"p": {"flow": lambda t: t}}}, "constants"),

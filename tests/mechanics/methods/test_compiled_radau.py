@@ -9,8 +9,8 @@ from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.radau import Implicit
 from ephs.mechanics.methods.stages import KeptJacobian, scheme_of
 from ephs.mechanics.tree.equations.tangent import Linearised
-from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.ball import BALL
+from tests.methods import choosing
 from tests.numerics import largest
 from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
@@ -114,7 +114,7 @@ def test_compiled_steps_of_what_is_smooth_are_those_taken_one_by_one(rtol, monke
 
 def test_surfaces_that_may_touch_have_three_stages_at_tolerances_that_are_not_fine(scene):
     def stages(rtol):
-        control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, np.inf, None)
+        control = choosing(rtol)
         return scheme_of(equations_of(scene), control).nodes.size
 
     assert [stages(rtol) for rtol in (1e-3, 1e-6, 1e-8)] == [3, 3, 5]

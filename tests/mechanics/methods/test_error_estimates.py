@@ -10,10 +10,10 @@ from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.solve.methods.collocation import radau
-from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.embedded import embedded_radau
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
+from tests.methods import choosing
 from tests.numerics import largest
 from tests.scenes import equations_of
 from tests.written import scene_of_text
@@ -39,7 +39,7 @@ def equations():
 
 
 def stepper(equations, method, **options):
-    control = Control(Tolerance(RTOL, {}), Tolerance(ATOL, {}), None, 0.0, math.inf, None)
+    control = choosing(RTOL, ATOL)
     made, _ = METHODS[method].make(Setting(equations.problem, 0.0, control, options, equations))
     return made
 
@@ -107,31 +107,11 @@ def test_the_estimate_of_radau_is_that_of_the_book_with_three_stages():
 
 @pytest.mark.parametrize(("rtol", "stages"), [(1e-2, 3), (1e-4, 5), (1e-6, 5), (1e-8, 7)])
 def test_radau_has_more_stages_at_finer_tolerances(rtol, stages, equations):
-    control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, math.inf, None)
+    control = choosing(rtol)
     made, _ = METHODS["radau"].make(Setting(equations.problem, 0.0, control, {}, equations))
     constant, _ = METHODS["radau"].make(Setting(equations.problem, 0.0, replace(control, step=0.1), {}, equations))
     assert (made.scheme.nodes.size, made.exponent) == (stages, stages + 1.0)
     assert constant.scheme.nodes.size == 3
-
-
-def test_powers_of_the_step_with_which_estimates_fall(equations):
-    found = {}
-    powers = {"rk54": 5, "rk87": 8, "radau": 6}
-    lengths = {"rk54": 0.05, "rk87": 0.2, "radau": 0.1}
-    for method, h in lengths.items():
-        made = stepper(equations, method)
-        one, two = (made.step(equations.start(0.0), part * h).error for part in (1.0, 0.5))
-        found[method] = (round(math.log2(one / two)), made.exponent)
-    assert found == {name: (power, float(power)) for name, power in powers.items()}
-
-
-@pytest.mark.parametrize("method", ["variational", "radau", "rk54", "rk87"])
-@pytest.mark.parametrize("h", [0.02, -0.02])
-def test_a_step_ends_a_step_later(equations, method, h):
-    made = stepper(equations, method)
-    assert not any(count for name, count in made.counts.items() if name not in ("keep", "chosen"))
-    attempt = made.step(equations.start(0.5), h)
-    assert (attempt.start.t, attempt.end.t, attempt.h) == (0.5, 0.5 + h, h)
 
 
 def test_matrices_are_kept_for_steps_of_one_length_and_made_anew_when_asked(equations):
@@ -146,3 +126,12 @@ def test_matrices_are_kept_for_steps_of_one_length_and_made_anew_when_asked(equa
     made.solve(start, y, 0.2)
     assert method.counts["jacobians"] == before + 1
     assert method.counts["factorisations"] == 3
+
+
+@pytest.mark.parametrize("method", ["variational", "radau", "rk54", "rk87"])
+@pytest.mark.parametrize("h", [0.02, -0.02])
+def test_a_step_ends_a_step_later(equations, method, h):
+    made = stepper(equations, method)
+    assert not any(count for name, count in made.counts.items() if name not in ("keep", "chosen"))
+    attempt = made.step(equations.start(0.5), h)
+    assert (attempt.start.t, attempt.end.t, attempt.h) == (0.5, 0.5 + h, h)

@@ -9,7 +9,7 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.auditing import rounding
 from ephs.solve.running.stepping import Taken
-from tests.scenes import SCENES
+from tests.scenes import SCENES, of_all_scenes
 
 
 @pytest.mark.parametrize("save_at", [None, np.linspace(0.0, 0.3, 8)])
@@ -38,7 +38,7 @@ def test_records_of_arrays_are_those_of_states(name, method, save_at, monkeypatc
     assert len(solution) > 4 and bool(rows) == compiled, "only loops and attached parts have no compiled implicit steps"
 
 
-@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+@of_all_scenes
 def test_mass_and_forces_on_places_are_those_of_bodies_and_storages_one_by_one(file):
     problem = problem_of_scene(ephs.load(file))
     d = problem.descriptor

@@ -16,16 +16,15 @@ from ephs.mechanics.rewrite.rewrite import rewrite
 from ephs.mechanics.scene.build import scene_system
 from ephs.operad import PortType
 from ephs.semantics import StructureError
-from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.primitives.pullback import Map, pull_back
 from ephs.semantics.spaces import PAIRS, SE3, pair
 from ephs.semantics.verdicts.checks import random_point
 from ephs.semantics.verdicts.search import search
 from ephs.testing import mechanisms
 from tests.mechanics.kernels import Draw, agreeing
-from tests.mechanics.rewrite.rewriting import levers, same_relation
+from tests.mechanics.rewrite.rewriting import same_relation
 from tests.numerics import generators, largest, seeds
-from tests.scenes import SCENES, shipped
+from tests.scenes import of_all_scenes, shipped
 
 MOMENTUM = PortType(quantity.body_momentum, True)
 
@@ -134,14 +133,6 @@ def test_a_folded_mechanism_has_the_same_relation(scene, seed):
     same_relation(system, done.system, seed)
 
 
-def test_levers_in_series_multiply():
-    done = rewrite(levers(), [FOLD])
-    assert {str(path) for path, _ in done.system.leaves()} == {"mass", "rub", "env"}
-    rub = dict(done.system.leaves())[Path.of("rub")]
-    matrix = rub.matrix({}, np.array([1.0, 0.0]), Reference())
-    assert matrix[0, 0] / 293.15 == pytest.approx(0.4 * (3.0 * 0.5) ** 2, rel=1e-15)
-
-
 # ---- steps -----------------------------------------------------------------------------------------------------
 
 
@@ -165,7 +156,7 @@ def agree(scene, method, step, steps):
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])
-@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+@of_all_scenes
 def test_folded_steps_are_the_same_steps(file, method):
     scene = ephs.load(file)
     agree(scene, method, 5e-4 if file.stem == "heavy-top" else 2e-3, 8)

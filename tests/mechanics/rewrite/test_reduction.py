@@ -18,7 +18,7 @@ from ephs.semantics.spaces import SE3
 from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
 from tests.numerics import generators, largest, seeds
-from tests.scenes import SCENES, model_of, shipped
+from tests.scenes import SCENES, model_of, of_all_scenes, shipped
 from tests.written import scene_of_text
 
 BY_NAME = {case.name: case for case in CASES}
@@ -111,7 +111,7 @@ def check_rank(scene):
     return steps
 
 
-@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+@of_all_scenes
 def test_loops_impose_all_that_they_did(file):
     scene = ephs.load(file)
     if not any(
@@ -297,7 +297,7 @@ def test_mechanisms_that_share_ground_and_heat_only_are_separate():
     assert "2 mechanisms of 1 to 3 degrees of freedom" in step.reason
 
 
-@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+@of_all_scenes
 def test_each_step_begins_where_the_last_one_ended(file):
     scene = ephs.load(file)
     found = ephs.reduce(scene)

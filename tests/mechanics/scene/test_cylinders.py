@@ -1,7 +1,6 @@
 """Hydraulic cylinders, gas springs, actuators and linear drives of scene files, against equations by hand."""
 
 import json
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -144,18 +143,6 @@ def test_work_and_heat_of_a_cylinder_are_in_the_ledger(tmp_path):
     lifted = MASS * GRAVITY * run.joint("rail").coordinate[-1, 0]
     assert np.isclose(run.work[-1], kinetic + lifted + oil + run.heat[-1], rtol=1e-11)
     assert np.isclose(run["thermal.oil.s"][-1], 500.0 * np.log1p(run.heat[-1] / (500.0 * 300.0)), rtol=1e-9)
-
-
-def test_an_adiabatic_gas_keeps_its_entropy(tmp_path):
-    strut = loaded(tmp_path, STRUT).gas_springs["strut"].changed(conductance=0.0)
-    scene = replace(loaded(tmp_path, STRUT), gas_springs={"strut": strut})
-    run = ephs.simulate(scene, UNTIL, method="natural4", step=1e-3)
-    assert not np.any(run["gas_springs.strut.gas.s"])
-    volume = VOLUME + GAS * run.joint("rail").coordinate[:, 0]
-    assert np.allclose(run["gas_springs.strut.gas.v"], volume, rtol=1e-12)
-    gas = FILLED * VOLUME / (GAMMA - 1.0) * ((VOLUME / volume) ** (GAMMA - 1.0) - 1.0)
-    rod = 0.5 * MASS * run.joint("rail").rate[:, 0] ** 2 + MASS * GRAVITY * run.joint("rail").coordinate[:, 0]
-    assert np.abs(rod + gas + AIR * (volume - VOLUME)).max() < 1e-11
 
 
 def test_files_with_rows_of_numbers_as_arrays_are_read(tmp_path):

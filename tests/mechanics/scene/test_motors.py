@@ -33,14 +33,6 @@ def test_a_motor_of_a_scene_is_the_one_put_together_by_hand():
     assert run.stats["form"] == "reduced"
 
 
-def test_steps_of_the_natural_method_come_to_the_same_motion():
-    scene = ephs.load(SCENE)
-    scene = replace(scene, motors={"drive": scene.motors["drive"].changed(current=3.0)})
-    exact = ended(scene, method="rk87", rtol=1e-11, atol=1e-12)[0]
-    coarse, fine = (ended(scene, method="natural", step=h, audit="off")[0] - exact for h in (2e-3, 1e-3))
-    assert np.allclose(coarse, 4.0 * fine, rtol=0.05, atol=1e-9)
-
-
 def test_an_armature_is_inertia_of_its_joint():
     scene = ephs.load(SCENE)
     free, held = (replace(scene, motors={}, joints={**scene.joints}) for _ in range(2))

@@ -59,6 +59,11 @@ def table(section, name, keys):
     return f"[{section}.{name}]\n" + "".join(f"{key} = {toml(value)}\n" for key, value in keys.items())
 
 
+def rod_between(at1, at2):
+    """The table of a rod from the ground to the ball."""
+    return table("rods", "r", {"bodies": ["ground", "ball"], "at1": at1, "at2": at2})
+
+
 def loaded(folder, text, name="scene.toml"):
     file = Path(folder) / name
     file.write_text(text, encoding="utf-8")
@@ -137,8 +142,8 @@ def test_a_section_that_nobody_registered_is_an_unknown_key(tmp_path):
 
 
 def test_rules_of_places_are_asked_once_bodies_are_there(tmp_path):
-    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 1.0], "at2": [0.0, 0.0, 1.0]}
-    found = faults(tmp_path, FALL + table("rods", "r", rod))
+    rod = rod_between([0.0, 0.0, 1.0], [0.0, 0.0, 1.0])
+    found = faults(tmp_path, FALL + rod)
     assert found["rods.r.at2"].expected == "a point apart from at1"
 
 
@@ -185,8 +190,8 @@ def test_a_parameter_is_what_the_file_would_say(tmp_path, keys, value, key):
 
 
 def test_entries_of_vectors_are_parameters(tmp_path):
-    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 1.0], "at2": [0.0, 0.0, 0.1]}
-    scene = loaded(tmp_path, FALL + table("rods", "r", rod))
+    rod = rod_between([0.0, 0.0, 1.0], [0.0, 0.0, 0.1])
+    scene = loaded(tmp_path, FALL + rod)
     assert read(scene, "rods.r.at1[2]") == 1.0
     assert varied(scene, {"rods.r.at1[2]": 2.0}).elements["rods"]["r"].at1 == [0.0, 0.0, 2.0]
 
@@ -209,17 +214,17 @@ def test_drag_falls_as_the_closed_form(tmp_path):
 
 
 def test_a_rod_keeps_its_length_and_swings_as_a_pendulum(tmp_path):
-    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 0.0], "at2": [0.0, 0.0, 0.0]}
+    rod = rod_between([0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
     text = FALL + "position = [0.6, 0.0, -0.8]\n"
-    swing = ephs.simulate(loaded(tmp_path, text + table("rods", "r", rod)), 1.0, step=0.01)
+    swing = ephs.simulate(loaded(tmp_path, text + rod), 1.0, step=0.01)
     joint = '[joints.j]\ntype = "spherical"\nbodies = ["ground", "bob"]\nat = [0.0, 0.0, 0.0]\naxis = [0.0, 1.0, 0.0]\n'
     point = text.replace("ball", "bob").replace("inertia = [0.1, 0.1, 0.1]", "inertia = [1e-9, 1e-9, 1e-9]")
     pendulum = ephs.simulate(loaded(tmp_path, point + joint), 1.0, method="rk87", rtol=1e-9)
     assert np.linalg.norm(swing.body("ball").position, axis=1) == pytest.approx(1.0, abs=1e-13)
     assert swing.body("ball").position[-1] == pytest.approx(pendulum.body("bob").position[-1], abs=2e-3)
-    assert ephs.simulate(loaded(tmp_path, text + table("rods", "r", rod)), 0.1).audit.passed
+    assert ephs.simulate(loaded(tmp_path, text + rod), 0.1).audit.passed
     with pytest.raises(ephs.OptionError, match=r"rods\.r\.line\.segment1\.st holds a rate"):
-        ephs.simulate(loaded(tmp_path, text + table("rods", "r", rod)), 0.1, method="rk54")
+        ephs.simulate(loaded(tmp_path, text + rod), 0.1, method="rk54")
 
 
 def test_a_rod_takes_one_freedom_and_a_tendon_none(tmp_path):
@@ -232,8 +237,8 @@ def test_a_rod_takes_one_freedom_and_a_tendon_none(tmp_path):
 
 
 def test_a_part_does_as_its_elements_do_flat(tmp_path):
-    rod = {"bodies": ["ground", "ball"], "at1": [0.1, 0.0, 0.0], "at2": [0.0, 0.1, 0.0]}
-    text = FALL + "position = [0.6, 0.0, -0.8]\n" + BOX + table("drags", "air", GOOD) + table("rods", "r", rod)
+    rod = rod_between([0.1, 0.0, 0.0], [0.0, 0.1, 0.0])
+    text = FALL + "position = [0.6, 0.0, -0.8]\n" + BOX + table("drags", "air", GOOD) + rod
     flat = loaded(tmp_path, text, "part.toml")
     place = 'format = 1\n[parts.left]\nuse = "part.toml"\nposition = [1.0, 2.0, 0.5]\n'
     place += "rotation = { axis = [0.0, 0.0, 1.0], angle_deg = 90.0 }\n"
@@ -416,8 +421,8 @@ def test_the_page_runs(capsys):
 
 
 def test_its_lines_are_drawn_in_parts_too(tmp_path):
-    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 1.0], "at2": [0.0, 0.0, 0.1]}
-    loaded(tmp_path, FALL + table("rods", "r", rod), "part.toml")
+    rod = rod_between([0.0, 0.0, 1.0], [0.0, 0.0, 0.1])
+    loaded(tmp_path, FALL + rod, "part.toml")
     nested = loaded(tmp_path, 'format = 1\n[parts.left]\nuse = "part.toml"\nposition = [1.0, 0.0, 0.0]\n')
     line = lines_of(nested)["rods.left.r-1"]
     assert (line.body1, line.body2) == ("ground", "left.ball")

@@ -1,20 +1,15 @@
-"""The sweeps over a tree: Pinocchio and the mass matrix accelerate alike, and all ways to run them agree."""
+"""The sweeps over a tree: the mass matrix accelerates alike, and all ways to run them agree."""
 
 import numpy as np
-import pinocchio as pin
-import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-import ephs
 from benchmarks import families
 from ephs.mechanics.road.programs import sweeps
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.tangent import Linearised
-from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import Program
 from ephs.testing import mechanisms
-from tests.mechanics.dynamics.pinocchio_models import KINDS, PinModel
 from tests.numerics import EPS, largest, seeds
 from tests.scenes import equations_of
 
@@ -95,64 +90,6 @@ def test_all_ways_to_run_the_sweeps_agree(tree):
     (known, _), (coded, _) = tree.unrolled(one.plain()), tree.unrolled(one.compiled())
     assert np.array_equal(known, coded)
     tree.alike(found, known)
-
-
-@pytest.mark.parametrize("kinds", [*((kind,) for kind in KINDS), tuple(KINDS)], ids="-".join)
-@slow
-@given(data=st.data())
-def test_pinocchio_accelerates_alike(kinds, data):
-    options = {"kinds": kinds, "loops": False, "friction": False, "springs": False, "heat": False}
-    scene = data.draw(mechanisms(max_bodies=6, **options))
-    tree, dynamics = Tree(scene, data.draw(seeds)), ephs.dynamics(scene)
-    assume(tree.packed.kind.joints)
-    other = PinModel(scene, dynamics)
-    state = dynamics.unpack(np.concatenate([tree.q, tree.r, dynamics.state0.array[tree.q.size + tree.r.size :]]))
-    q, v = other.configuration(dynamics, state), other.vector(tree.r)
-    expected = other.back(pin.aba(other.model, other.data, q, v, other.vector(tree.force)))
-    tree.alike(tree.run(tree.sweeps.program.plain())[0], expected)
-
-
-@pytest.mark.parametrize("kinds", [(kind,) for kind in KINDS], ids="-".join)
-@settings(slow, max_examples=4)
-@given(data=st.data())
-def test_tangents_are_those_of_pinocchio(kinds, data):
-    """By the same function run with dual numbers, along drawn directions of places, rates and forces."""
-    options = {"kinds": kinds, "loops": False, "friction": False, "springs": False, "heat": False}
-    scene = data.draw(mechanisms(max_bodies=4, **options))
-    tree, dynamics = Tree(scene, data.draw(seeds)), ephs.dynamics(scene)
-    assume(tree.packed.kind.joints)
-    other, links = PinModel(scene, dynamics), tree.packed.links
-    v, dr, df = np.random.default_rng(data.draw(seeds)).standard_normal((3, tree.equations.n))
-    dq = np.zeros(tree.q.size)
-    for i in range(tree.packed.size):
-        joint, at, way = tree.packed.kind.joints[links[i].kind], links[i].q_at, v[links[i].r_at :]
-        dq[at : at + joint.size] = slope(joint, tree.q[at : at + joint.size], way[: joint.dim])
-    program, size = tree.sweeps.tangent(), (tree.packed.size + 1) * tree.sweeps.width
-    found = []
-    for calls in (program.plain(), program.compiled()):
-        tables = tree.packed.size, tree.packed.integers, tree.packed.reals
-        rate, memory = (np.zeros(v.size), np.zeros(v.size)), (np.zeros(size), np.zeros(size))
-        state = (tree.q, dq), (tree.r, dr), (tree.force, df)
-        calls["accelerations"](*tables, memory, tree.packed.gravity, *state, rate)
-        found.append(rate[1])
-    assert np.array_equal(*found)
-    state = dynamics.unpack(np.concatenate([tree.q, tree.r, dynamics.state0.array[tree.q.size + tree.r.size :]]))
-    q, r = other.configuration(dynamics, state), other.vector(tree.r)
-    by_q, by_r, by_force = pin.computeABADerivatives(other.model, other.data, q, r, other.vector(tree.force))
-    whole = np.triu(by_force) + np.triu(by_force, 1).T
-    expected = other.back(by_q @ other.vector(v) + by_r @ other.vector(dr) + whole @ other.vector(df))
-    size = max(largest(by_q), largest(by_r), largest(whole)) * max(largest(v), largest(dr))
-    condition = np.linalg.cond(tree.equations.mass(tree.q, tree.r))
-    assert largest(found[0] - expected) <= 1e-12 * condition * max(1.0, size)
-
-
-def slope(joint, x, v):
-    """The change of a joint's stored element that a left-trivialised change makes."""
-    if joint.size == joint.dim:
-        return v
-    w, u = x[0], x[1:4]
-    turn = 0.5 * np.concatenate([[-u @ v[:3]], w * v[:3] + np.cross(u, v[:3])])
-    return turn if joint.size == 4 else np.concatenate([turn, quaternion_to_matrix(x[:4]) @ v[3:]])
 
 
 def test_a_plane_leaves_the_third_dimension_out():

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import ephs
@@ -10,8 +9,6 @@ from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.methods.registry import METHODS
-from tests.mechanics.tree.test_energy_of_states import tanks
-from tests.numerics import largest
 from tests.oscillator import damped_oscillator
 
 CHOOSING = [
@@ -56,22 +53,6 @@ def test_constant_steps_have_their_order(method):
     order, step = METHODS[method].order, 0.25 if METHODS[method].order >= 4 else 0.0625
     coarse, fine = missed(step), missed(0.5 * step)
     assert fine <= max(coarse / 2.0 ** (order - 0.5), 1e-12)
-
-
-def test_a_pipe_between_tanks_is_its_equations():
-    """Fluid, inertance, a loss that is no line, and its heat; the equations written by hand, by SciPy."""
-    found = ephs.simulate(
-        tanks(), 20.0, method="rk87", initial={"tank1.v": 3.0, "tank2.v": 0.5}, rtol=1e-10, atol=1e-10, audit="warn"
-    )
-
-    def rates(_, y):
-        a, b, g = y
-        flow = g / 1e5
-        return [flow, -flow, 9.81e3 * (b - a / 2.0) - 2e3 * flow - 5e3 * abs(flow) * flow]
-
-    by_hand = solve_ivp(rates, (0.0, 20.0), [3.0, 0.5, 0.0], method="DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
-    ends = np.array([found[path][-1] for path in ("tank1.v", "tank2.v", "pipe.g")])
-    assert largest(ends - by_hand) <= 1e-8 * largest(by_hand)
 
 
 def test_a_derivative_is_that_of_the_exponential():

@@ -26,6 +26,7 @@ from ephs.semantics.spaces import PAIRS, manifold, pair
 from ephs.testing import nestings
 from tests.numerics import largest
 from tests.semantics.test_base import COUPLED
+from tests.semantics.zoo import drag
 
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 OPEN = {
@@ -88,14 +89,9 @@ def test_check_names_the_junction(case):
         assert "no motion exists" in equations._repr_latex_() and not system.equations(form).doubt
 
 
-def quadratic(p, s):
-    g = abs(p)
-    return np.array([[g * s, -g * p], [-g * p, g * p * p / s]])
-
-
 def test_what_an_irreversible_component_does_is_not_known_before_the_efforts():
     """A spring on a damper of quadratic force has a motion, q̇ = −√(k q): at rest M is zero, which says nothing."""
-    damper = ephs.irreversible({"p": Q.momentum, "s": Q.entropy}, quadratic)
+    damper = drag(lambda p, s: abs(p))()
     system = Pattern.from_text("q: displacement; p: momentum; s: entropy; k(q); g(q, p); d(p, s); env(s)")(
         k=lib.spring(k=1.0), g=lib.pkc(), d=damper, env=lib.environment()
     )

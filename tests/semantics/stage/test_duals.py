@@ -154,23 +154,6 @@ def test_slopes_are_the_same_in_machine_code_and_for_one_direction_or_three(seed
         assert np.array_equal(alone[3], compiled[3].reshape(12, 3)[:, direction])
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_slopes_agree_with_differences(seed):
-    """A central difference is good for the cube root of the rounding, squared."""
-    arguments, slopes = drawn(seed), [s[:, 0] for s in tangent_slopes(np.random.default_rng(seed), 1)]
-    *values, out, rates = results(PROGRAM.compiled(), "tangent", arguments, slopes)
-    step, found = 6e-6, []
-    for sign in (1.0, -1.0):
-        x, a, points, gain, zero = arguments
-        moved = Point.table(4)
-        moved.integers.array[:] = 2
-        moved.reals.array[:] = points.reals.array + sign * step * slopes[2]
-        shifted = [x + sign * step * slopes[0], a + sign * step * slopes[1].reshape(4, 2), moved]
-        found.append(results(PROGRAM.compiled(), "value", [*shifted, gain + sign * step * slopes[3][0], zero]))
-    assert np.array_equal(np.r_[values[0], values[1]], results(PROGRAM.compiled(), "value", arguments))
-    assert np.allclose(np.r_[out, rates], (found[0] - found[1]) / (2 * step), rtol=0, atol=1e-8)
-
-
 def test_a_slope_that_nobody_keeps_is_named():
     with pytest.raises(StageError, match=r"run.*, test_duals.py:\d+: a number with a derivative is stored where"):
         Program("lost", lost=entry.tangent("x", "points")).compiled()

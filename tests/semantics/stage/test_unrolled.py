@@ -69,20 +69,6 @@ def parts(flat):
 ENTRY = Entry(sums, parts=table(Part), x=vector(2), work=vector(), out=vector())
 
 
-@pytest.mark.parametrize("flat", [False, True])
-def test_a_program_unrolled_does_the_same(flat):
-    given = parts(flat)
-    program = Program("both", looped=ENTRY, unrolled=ENTRY.given(parts=given, work=np.zeros(4)))
-    draw = np.random.default_rng(0)
-    for _ in range(20):
-        x, found = draw.normal(size=2), []
-        for calls in (program.compiled(), program.plain()):
-            out, other = np.zeros(5), np.zeros(5)
-            found.append((calls["looped"](given, x, np.zeros(4), out), out))
-            found.append((calls["unrolled"](x, other), other))
-        assert all(one[0] == found[0][0] and np.array_equal(one[1], found[0][1]) for one in found)
-
-
 def test_what_is_known_to_be_zero_vanishes():
     def operations(flat):
         text = Program("one", one=ENTRY.given(parts=parts(flat), work=np.zeros(4))).text()
