@@ -11,6 +11,7 @@ TEXTS: Final = {
     "output": "output {found!r}: expected one of {expected}, or the beginning of such a name",
     "function": "the input at {where} is a Python function, expected a constant: name it as an input of the export",
     "python": "{where}: a component is evaluated by Python, expected staged functions",
+    "impacts": "{where}: a hard contact or stop, expected elastic ones",
     "suffix": "output file {found!r}: expected a name that ends in {expected}",
     "target": "target {found!r}: expected one of {expected}",
     "tool": "{what} needs {tool}, which is not installed: pip install {package}",

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Annotated, Any, final
 
 import numpy as np
@@ -204,15 +204,13 @@ def image_of(
     Raises
     ------
     ExportError
-        The method has constant memory of another kind, or an input has no place.
+        The method has constant memory of another kind, an input has no place, or a contact or stop is hard.
     """
     if method not in METHODS:
         raise ExportError("method", found=method, expected=" or ".join(METHODS))
 
-    def made(values: Mapping[str, float]) -> Image:
-        return _started(varied(model, values, strict=False), inputs, method, (rtol, atol, step), until)
-
-    found = _started(model, inputs, method, (rtol, atol, step), until)
+    started = partial(_started, inputs=inputs, method=method, steps=(rtol, atol, step), until=until)
+    found = started(model)
     for path in parameters:
         for name in inputs:
             if name.startswith("actuators.") and path.startswith(f"{name}."):
@@ -220,7 +218,7 @@ def image_of(
     if not parameters:
         return found
     start = {path: read(model, path) for path in parameters}
-    dependences = dependence(start, lambda values: made(values).numbers)
+    dependences = dependence(start, lambda values: started(varied(model, values, strict=False)).numbers)
     for each in dependences:
         _keep_apart(found, each, parameters)
     variables = tuple(ImageNumber(path, "", k, value) for k, (path, value) in enumerate(start.items()))
@@ -240,25 +238,26 @@ def _started(
     model: Scene | System, inputs: Sequence[str], method: str, steps: tuple[float, float, float | None], until: float
 ) -> Image:
     """Return the run without parameters."""
-    (rtol, atol, step), given = steps, dict.fromkeys(inputs, 0.0)
+    rtol, atol, step = steps
     if isinstance(model, Scene):
         known = [*(f"joints.{name}" for name in model.joints), *_actuators(model)]
         for name in inputs:
             if name not in known:
                 raise ExportError("input", found=name, expected=", ".join(known))
-        problem = problem_of_scene(model, None, given)
+        problem = problem_of_scene(model, None, dict.fromkeys(inputs, 0.0))
     else:
         problem = problem_of_system(model)
+    if (hard := problem.descriptor.strikes) is not None:
+        raise ExportError("impacts", where=hard)
     for path, signal in problem.signals.items():
         if not signal.constant:
             raise ExportError("function", where=path)
     equations = ReducedEquations(problem, 0.0)
     control = control_of(problem, tableau(method).order, rtol, atol, step, None, None, None)
-    state = equations.start(0.0)
     explicit = Explicit(equations, control, tableau(method))
     policy = None if step is not None else Proportional(explicit)
-    span = Span(state, 0.0, until, first_step(control, until), control, policy, np.zeros(0), 0)
-    leg = explicit.many(span)
+    start = equations.start(0.0)
+    leg = explicit.many(Span(start, 0.0, until, first_step(control, until), control, policy, np.zeros(0), 0))
     if leg is None:
         raise ExportError("python", where=problem.name)
     return _image(problem, equations, leg, _inputs(equations, model, inputs))

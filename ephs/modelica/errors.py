@@ -18,7 +18,7 @@ TEXTS: Final = {
     "algorithm": "{where}: an algorithm, expected equations",
     "branch": "{where}: switches on {found}",
     "discrete": "{where}: {found!r} is of type {kind}, expected a real number",
-    "initial": "{where}: an initial equation, expected the value of one variable: {equation}",
+    "initial": "{where}: an initial equation, expected the value of one state: {equation}",
     "time": "{where}: a function of time drives it",
     "expression": "{where}: {found}, expected arithmetic",
     "nonlinear": "{where}: not linear in its currents, forces and rates: {equation}",

@@ -76,10 +76,9 @@ class ExpressionReader:
         if kind == "ComponentRef":
             return self._named(node, scope)
         if kind == "IfExpression":
-            for condition, found in zip(node.conditions, node.expressions, strict=False):
-                if self.truth(condition):
-                    return self.value(found, scope)
-            return self.value(node.expressions[-1], scope)
+            branches = zip(node.conditions, node.expressions, strict=False)
+            taken = next((found for condition, found in branches if self.truth(condition)), node.expressions[-1])
+            return self.value(taken, scope)
         if kind == "Expression":
             return self._applied(node, scope)
         raise ModelicaError("expression", where=self.where, found=node_text(node))
@@ -92,7 +91,7 @@ class ExpressionReader:
         return bool(found)
 
     def _applied(self, node: Any, scope: Any) -> Any:
-        name = str(node.operator).rsplit(".", 1)[-1]
+        package, _, name = str(node.operator).rpartition(".")
         if name == "der":
             inner = self.value(node.operands[0], scope)
             return sum(
@@ -103,7 +102,7 @@ class ExpressionReader:
             raise ModelicaError("branch", where=self.where, found="initial()")
         if name == "homotopy":
             return self.value(node.operands[0], scope)
-        if name not in ARITHMETIC:
+        if name not in ARITHMETIC or package.rpartition(".")[-1] not in ("", "Math"):
             raise ModelicaError("expression", where=self.where, found=f"the function {node_text(node)}")
         try:
             return ARITHMETIC[name](*(self.value(each, scope) for each in node.operands))

@@ -1,8 +1,9 @@
 """A component of Modelica as flat equations of Pymoca, in SymPy's expressions."""
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, final
 
@@ -31,6 +32,8 @@ class Domain:
     position: bool = False
 
 
+LENGTHS = ("rad", "m")
+"""Units of positions."""
 DOMAINS = (
     Domain("V", "A", quantity.charge),
     Domain("rad", "N.m", quantity.angular_momentum, position=True),
@@ -69,7 +72,8 @@ class ZeroResidual:
 class Flat:
     """A component: its ports, its equations, and of each variable the unit and the start value.
 
-    Variables without a unit entry are signals that are read: Pymoca leaves connectors of signals undeclared.
+    Variables without a unit entry are signals that are read: Pymoca leaves connectors of signals undeclared. Those in
+    ``held`` start at these values and not near them, by what is written there.
     """
 
     name: str
@@ -77,6 +81,16 @@ class Flat:
     equations: tuple[ZeroResidual, ...]
     units: Mapping[Symbol, str]
     starts: Mapping[Symbol, float]
+    held: Mapping[Symbol, str]
+
+    def require_started(self, states: Collection[Symbol]) -> None:
+        """Refuse values at the start of what is none of the states: nothing would begin there.
+
+        A position that is zero is where all others are that nobody places.
+        """
+        for symbol, text in self.held.items():
+            if symbol not in states and (self.starts[symbol] or self.units[symbol] not in LENGTHS):
+                raise ModelicaError("initial", where=self.name, equation=text)
 
 
 def tree_of(paths: tuple[Path, ...]) -> Any:
@@ -121,7 +135,7 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
         readings = set(_readings(instantiate(tree, name))) - found.symbols.keys()
     except Exception as error:  # the parser raises many kinds of exceptions
         raise ModelicaError("flat", where=name, found=_first(error)) from error
-    if found.statements:
+    if found.statements or found.initial_statements:
         raise ModelicaError("algorithm", where=name)
     symbols: dict[str, Any] = dict(found.symbols)
     fixed = {key for key, symbol in symbols.items() if {"parameter", "constant"} & set(symbol.prefixes)}
@@ -141,10 +155,10 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
     own = {port.flow.name for port in ports}
     try:
         equations = tuple(_equations(reader, found.equations, own))
-        starts = _starts(reader, free, _equations(reader, found.initial_equations, own))
+        starts, held = _starts(reader, free, _equations(reader, found.initial_equations, own))
     except RecursionError:
         raise ModelicaError("expression", where=name, found="parameters that need each other") from None
-    return Flat(name, ports, equations, units, starts)
+    return Flat(name, ports, equations, units, starts, held)
 
 
 def _readings(instance: Any) -> Iterator[str]:
@@ -162,19 +176,24 @@ def _first(error: Exception) -> str:
     return next(iter(str(error).splitlines()), type(error).__name__)
 
 
-def _starts(reader: ExpressionReader, free: Mapping[str, Any], initial: Sequence[ZeroResidual]) -> dict[Symbol, float]:
-    """Values at the start: those of variables, unless initial equations give them."""
+def _starts(
+    reader: ExpressionReader, free: Mapping[str, Any], initial: Sequence[ZeroResidual]
+) -> tuple[dict[Symbol, float], dict[Symbol, str]]:
+    """Values at the start: those of variables, unless initial equations give them; and the fixed ones, as equations."""
     out = {symbol: 0.0 for symbol in reader.variables.values()}
+    held: dict[Symbol, str] = {}
     for key, symbol in reader.variables.items():
         if key in free and getattr(free[key].start, "value", 0) is not None:
             out[symbol] = float(reader.value(free[key].start))
+            if reader.truth(free[key].fixed):
+                held[symbol] = f"{key} = {node_text(free[key].start)}"
     for each in initial:
         symbol = next(iter(each.residual.free_symbols), None)
         slope = each.residual.diff(symbol) if symbol in out else sp.Symbol("none")
         if slope.free_symbols or each.residual.free_symbols != {symbol}:
             raise ModelicaError("initial", where=reader.where, equation=each.text)
-        out[symbol] = float(sp.expand(symbol - each.residual / slope))
-    return out
+        out[symbol], held[symbol] = float(sp.expand(symbol - each.residual / slope)), each.text
+    return out, held
 
 
 def _parameters(
@@ -241,14 +260,8 @@ def _equations(reader: ExpressionReader, nodes: Any, own: set[str]) -> list[Zero
         if kind == "Function" or (kind == "Expression" and str(node.operator) in ("assert", "terminate")):
             continue
         if kind == "IfEquation":
-            taken = next(
-                (
-                    block
-                    for place, block in enumerate(node.blocks)
-                    if place >= len(node.conditions) or reader.truth(node.conditions[place])
-                ),
-                (),
-            )
+            branches = zip_longest(node.conditions, node.blocks, fillvalue=True)
+            taken = next((block for condition, block in branches if reader.truth(condition)), ())
             out += _equations(reader, taken, own)
         elif kind == "WhenEquation":
             raise ModelicaError("branch", where=reader.where, found=f"when {node_text(node.conditions[0])}")

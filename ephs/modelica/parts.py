@@ -12,7 +12,7 @@ from ephs.modelica.expressions import Matrix, Symbol, derivative, sp
 from ephs.modelica.flat import Flat
 from ephs.modelica.relation import PortRelation, needed, relation_of
 from ephs.modelica.structure import PortStructure, power_of, stored_energy, structure_of
-from ephs.modelica.thermal import heated, require_heat, warm_of
+from ephs.modelica.thermal import flowless, heated, require_heat, warm_of
 from ephs.operad import Directory, Path, Pattern, PortType, Quantity, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundles.errors import StructureError
@@ -80,13 +80,13 @@ def component_of(flat: Flat) -> ModelicaComponent:
         raise ModelicaError("signal", where=flat.name, found=symbol)
     if all(port.heat for port in flat.ports):
         try:
-            primitive, names, initial = heated(flat, equations)
+            primitive, names = heated(flat, equations)
         except StructureError as error:
             raise ModelicaError("structure", where=flat.name, found=error) from error
         box = {"storage": "stored", "reversible": "dirac"}.get(primitive.kind, "loss")
         parts = _AssembledBoxes({port.name: quantity.entropy for port in flat.ports}, {}, {})
         parts.boxes[box] = ({inner: outer for outer, inner in names.items()}, primitive)
-        start = {f"{box}.{key}": x for key, x in initial.items()}
+        start = {"stored.s": 0.0} if box == "stored" else {}
         return ModelicaComponent(flat.name, parts.system().with_initial(start), start)
     relation, warm = relation_of(flat, equations), warm_of(flat)
     hessian = stored_energy(flat.name, relation, warm)
@@ -110,9 +110,11 @@ def _built(flat: Flat, relation: PortRelation, hessian: Matrix, found: PortStruc
     initial: dict[str, float] = {}
     if stores:
         matrix = _dual(relation, hessian)
-        interface = power_ports(**stores)
-        parts.boxes["stored"] = ({name: name for name in stores}, quadratic("stored", interface, matrix, ()))
-        starts = [flat.starts.get(each.symbol, 0.0) - float(each.rest) for each in relation.states]
+        parts.boxes["stored"] = (
+            {name: name for name in stores},
+            quadratic("stored", power_ports(**stores), matrix, ()),
+        )
+        starts = [flat.starts[each.symbol] - float(each.rest) for each in relation.states]
         amounts = _numbers(hessian) @ np.array(starts)
         for place, (name, state) in enumerate(zip(stores, relation.states, strict=True)):
             initial[f"stored.{name}"] = float(amounts[place]) if state.effort else starts[place]
@@ -132,15 +134,12 @@ def _built(flat: Flat, relation: PortRelation, hessian: Matrix, found: PortStruc
         loss = _loss(lossy, heat, temperature, found.loss.extract(rows, rows), start)
         parts.boxes["loss"] = ({**{name: name for name in lossy}, heat: heat}, loss)
         parts.ports[heat] = quantity.entropy
-    elif any(port.heat for port in flat.ports):
-        idle = constant_structure("idle", power_ports(**{heat: quantity.entropy}), np.zeros((1, 1)), np.zeros((0, 1)))
-        parts.ports[heat] = quantity.entropy
-        parts.boxes["idle"] = ({heat: heat}, idle)
-    free = [name for name in outer if not any(name in ports for ports, _ in parts.boxes.values())]
-    if free:  # whose flows vanish
-        interface = power_ports(**{name: outer[name] for name in free})
-        idle = constant_structure("open", interface, np.zeros((len(free), len(free))), np.zeros((0, len(free))))
-        parts.boxes["open"] = ({name: name for name in free}, idle)
+    joined = {name for ports, _ in parts.boxes.values() for name in ports}
+    warm = {port.name: quantity.entropy for port in flat.ports if port.heat}
+    free = {name: of for name, of in (outer | warm).items() if name not in joined}
+    if free:
+        parts.ports |= free
+        parts.boxes["open"] = ({name: name for name in free}, flowless(power_ports(**free)))
     return ModelicaComponent(flat.name, parts.system().with_initial(initial), initial)
 
 
@@ -150,15 +149,12 @@ def _numbers(matrix: Matrix) -> np.ndarray:
 
 def _dual(relation: PortRelation, hessian: Matrix) -> np.ndarray:
     """The energy's second derivative by the stored amounts: H⁻¹ among states that are efforts, else H."""
-    out = sp.zeros(*hessian.shape)
+    out = np.zeros(hessian.shape)
     for effort in (True, False):
         rows = [row for row, state in enumerate(relation.states) if state.effort == effort]
         block = hessian.extract(rows, rows)
-        block = block.inv() if effort and rows else block
-        for i, row in enumerate(rows):
-            for j, column in enumerate(rows):
-                out[row, column] = block[i, j]
-    return _numbers(out)
+        out[np.ix_(rows, rows)] = _numbers(block.inv() if effort and rows else block)
+    return out
 
 
 def _dirac(ports: Mapping[str, Quantity], skew: np.ndarray, constraint: np.ndarray) -> tuple[Reversible, bool]:

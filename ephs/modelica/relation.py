@@ -9,11 +9,9 @@ from typing import Any, final
 
 from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Expr, Matrix, Symbol, derivative, sp
-from ephs.modelica.flat import Connector, Flat, ZeroResidual
+from ephs.modelica.flat import LENGTHS, Connector, Flat, ZeroResidual
 from ephs.operad import Quantity, quantity
 
-LENGTHS = ("rad", "m")
-"""Units of positions."""
 STATES: dict[str, tuple[Quantity, bool]] = {
     "V": (quantity.charge, True),
     "A": (quantity.flux_linkage, True),
@@ -108,10 +106,9 @@ def relation_of(flat: Flat, equations: tuple[ZeroResidual, ...]) -> PortRelation
     watts = {symbol for symbol, unit in flat.units.items() if unit == "W"}
     powers = tuple(each for each in equations if each.residual.free_symbols & watts)
     linear = [each for each in equations if not each.residual.free_symbols & watts]
-    seen = set().union(
-        *(each.residual.free_symbols for each in linear), *(each.residual.free_symbols for each in powers)
-    )
+    seen = set().union(*(each.residual.free_symbols for each in equations))
     symbols = tuple(_states(flat, seen, moving))
+    flat.require_started(symbols)
     efforts = [derivative(port.potential) if port.domain.position else port.potential for port in ports]
     flows = [port.flow for port in ports]
     rates = [derivative(symbol) for symbol in symbols]

@@ -45,7 +45,7 @@ def stored_energy(name: str, relation: PortRelation, warm: dict[Symbol, Expr]) -
     ModelicaError
         There is none, or more than one.
     """
-    k = len(relation.states)
+    k, states = len(relation.states), ", ".join(each.symbol.name for each in relation.states)
     unknown = {(i, j): sp.Symbol(f"H{i}{j}") for i in range(k) for j in range(i, k)}
     hessian = sp.Matrix(k, k, lambda i, j: unknown[min(i, j), max(i, j)])
     if not k:
@@ -61,15 +61,12 @@ def stored_energy(name: str, relation: PortRelation, warm: dict[Symbol, Expr]) -
         left = sorted(hessian.free_symbols, key=str)
         found = sp.linsolve(conditions, *left) if conditions and left else {tuple(left)}
         if not found or (conditions and not left):
-            states = ", ".join(each.symbol.name for each in relation.states)
             raise ModelicaError("stored", where=name, states=states, equation=relation.laws)
         (solution,) = found
         hessian = hessian.subs(dict(zip(left, solution, strict=True)))
     if hessian.free_symbols:
-        states = ", ".join(each.symbol.name for each in relation.states)
         raise ModelicaError("undetermined", where=name, states=states)
     if not hessian.is_positive_definite:
-        states = ", ".join(each.symbol.name for each in relation.states)
         raise ModelicaError("unstable", where=name, states=states, found=hessian.tolist())
     return hessian
 

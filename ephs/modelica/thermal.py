@@ -9,11 +9,11 @@ from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Expr, Matrix, Symbol, derivative, sp
 from ephs.modelica.flat import Connector, Flat, ZeroResidual
 from ephs.modelica.relation import PortRelation
-from ephs.operad import quantity
+from ephs.operad import Interface, quantity
 from ephs.semantics import library
 from ephs.semantics.library.formulas import heat_transfer
 from ephs.semantics.primitives.constructors import irreversible
-from ephs.semantics.primitives.primitives import Primitive, power_ports
+from ephs.semantics.primitives.primitives import Primitive, Reversible, power_ports
 from ephs.semantics.primitives.structures import constant_structure
 
 
@@ -49,21 +49,23 @@ def require_heat(flat: Flat, relation: PortRelation, form: Matrix) -> None:
         raise ModelicaError("heat", where=flat.name, equation=texts or "there are none of powers")
 
 
-def heated(flat: Flat, equations: tuple[ZeroResidual, ...]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
-    """A component with heat ports only: the primitive, its ports by those of the component, and states at the start.
+def heated(flat: Flat, equations: tuple[ZeroResidual, ...]) -> tuple[Primitive, dict[str, str]]:
+    """A component with heat ports only: the primitive, and its ports by those of the component.
 
     Raises
     ------
     ModelicaError
         It is neither a capacity nor a conductor, nor joins its ports without a loss.
     """
-    residuals = _reduced(flat, equations)
+    same = _same(flat, equations)
+    residuals = [each for each in (sp.expand(each.residual.subs(same)) for each in equations) if each != 0]
+    flat.require_started([*same, *same.values()] if len(flat.ports) == 1 else ())
     ideal = _ideal(flat, residuals)
     if ideal is not None:
-        return ideal, {port.name: port.name for port in flat.ports}, {}
+        return ideal, {port.name: port.name for port in flat.ports}
     flows = _solved(flat, residuals, equations)
     if len(flat.ports) == 1:
-        return _capacity(flat, flows)
+        return _capacity(flat, flows, same)
     if len(flat.ports) == 2:
         return _conductor(flat, flows)
     raise _refused(flat, flows)
@@ -83,14 +85,20 @@ def _ideal(flat: Flat, residuals: list[Expr]) -> Primitive | None:
     joined = sp.diag(equal, sp.ones(1, n)) if n > 1 else None
     ports = power_ports(**{port.name: quantity.entropy for port in flat.ports})
     if found[:n, :] == sp.Matrix.hstack(sp.zeros(n), sp.eye(n)).rref()[0]:
-        return constant_structure("open", ports, np.zeros((n, n)), np.zeros((0, n)))
+        return flowless(ports)
     if joined is not None and found[:n, :] == joined.rref()[0]:
         return constant_structure("joined", ports, np.zeros((n, n)), np.array(equal.tolist(), dtype=float))
     return None
 
 
-def _reduced(flat: Flat, equations: tuple[ZeroResidual, ...]) -> list[Expr]:
-    """The equations with temperatures renamed to their ports'."""
+def flowless(ports: Interface) -> Reversible:
+    """What takes nothing at its ports."""
+    n = len(ports)
+    return constant_structure("open", ports, np.zeros((n, n)), np.zeros((0, n)))
+
+
+def _same(flat: Flat, equations: tuple[ZeroResidual, ...]) -> dict[Symbol, Symbol]:
+    """Of each temperature that is a port's, and of its derivative, those of the port."""
     potentials = {port.potential for port in flat.ports}
     same: dict[Symbol, Symbol] = {}
     for each in equations:
@@ -100,8 +108,7 @@ def _reduced(flat: Flat, equations: tuple[ZeroResidual, ...]) -> list[Expr]:
             (symbol,), (port,) = inner, symbols & potentials
             if sp.expand(each.residual.subs(symbol, port)) == 0:
                 same |= {symbol: port, derivative(symbol): derivative(port)}
-    residuals = (sp.expand(each.residual.subs(same)) for each in equations)
-    return [each for each in residuals if each != 0]
+    return same
 
 
 def _solved(flat: Flat, residuals: list[Expr], equations: tuple[ZeroResidual, ...]) -> dict[Connector, Expr]:
@@ -118,7 +125,7 @@ def _solved(flat: Flat, residuals: list[Expr], equations: tuple[ZeroResidual, ..
     return flows
 
 
-def _capacity(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
+def _capacity(flat: Flat, flows: dict[Connector, Expr], same: dict[Symbol, Symbol]) -> tuple[Primitive, dict[str, str]]:
     """C θ̇ = Q: E = C θ, s = C log(θ/θ₁) with the start temperature θ₁."""
     (port,) = flat.ports
     rate = derivative(port.potential)
@@ -127,17 +134,17 @@ def _capacity(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dict
         raise ModelicaError("source", where=flat.name, equation=_flow_equations(flows))
     if not capacity.is_number or not capacity > 0:
         raise _refused(flat, flows)
-    starts = {s: flat.starts.get(s) for s, unit in flat.units.items() if unit == "K" and s != port.potential}
-    start = next((each for each in starts.values() if each), flat.starts.get(port.potential) or 293.15)
+    named = sorted([*same, port.potential], key=lambda each: each not in flat.held)
+    start = next((flat.starts[each] for each in named if flat.starts.get(each)), 293.15)
     c = float(capacity)
-    return library.thermal_capacity(c1=c * start, c2=c), {port.name: "s"}, {"s": 0.0}
+    return library.thermal_capacity(c1=c * start, c2=c), {port.name: "s"}
 
 
-def _conductor(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
+def _conductor(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dict[str, str]]:
     """Q₁ = −Q₂ = h(θ₁, θ₂) (θ₁ − θ₂) with h ≥ 0."""
     first, second = flat.ports
-    if sp.expand(flows[first] + flows[second]) != 0:
-        taken = sp.expand(flows[first] + flows[second])
+    taken = sp.expand(flows[first] + flows[second])
+    if taken != 0:
         raise ModelicaError("first", where=flat.name, found=taken, equation=_flow_equations(flows))
     one, two = sp.symbols("one two", positive=True)
     there = {first.potential: one, second.potential: two}
@@ -148,14 +155,14 @@ def _conductor(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dic
     if sp.simplify(h.subs(two, one)).has(sp.zoo, sp.nan, sp.oo):
         raise _refused(flat, flows)
     if h.is_number:
-        return library.heat_transfer(h=float(h)), names, {}
+        return library.heat_transfer(h=float(h)), names
     value: Callable[..., Any] = sp.lambdify((one, two), h, modules=np)
 
     def matrix(s1: Any, s2: Any) -> Any:
         return heat_transfer(s1, s2, value(s1, s2))
 
     ports = {"s1": quantity.entropy, "s2": quantity.entropy}
-    return irreversible(ports, matrix, name="heat_transfer"), names, {}
+    return irreversible(ports, matrix, name="heat_transfer"), names
 
 
 def _flow_equations(flows: dict[Connector, Expr]) -> str:

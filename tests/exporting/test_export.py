@@ -245,6 +245,29 @@ def test_what_cannot_be_exported_is_refused_by_name(crank, tmp_path, fault):
     assert not list(tmp_path.iterdir())
 
 
+HARD = """
+format = 1
+[bodies.ball]
+mass = 1.0
+inertia = [0.01, 0.01, 0.01]
+position = [0.0, 0.0, 0.2]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "ball"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+limits = [-0.1, 1.0]
+"""
+
+
+def test_hard_stops_are_refused_by_name():
+    """And elastic ones are in the program: it stands where a run does."""
+    with pytest.raises(ephs.ExportError, match=r"joints\.rail\..*: a hard contact or stop"):
+        image_of(scene_of_text(f"{HARD}limit_restitution = 0.5\n"))
+    model = scene_of_text(f"{HARD}limit_stiffness = 1e4\n")
+    assert_named(advanced(model, 0.3).outputs(), ephs.simulate(model, 0.3, method="rk87"), 1e-6)
+
+
 def test_webassembly_gives_the_same_bits(crank, tmp_path):
     _, model, made, expected = crank
     ephs.export(model, tmp_path / "crank.wasm", inputs=["joints.bearing"], until=0.3)

@@ -106,8 +106,10 @@ package Parts "Components by their textbook equations, in the units and connecto
     Heat port;
     parameter Real v0 = 1;
     parameter Real v1 = 0;
+    Real rise(unit = "K", start = 5);
     Real T(unit = "K", start = 2*v0 - v1);
   equation
+    rise = T - 300;
     T = port.T;
     20*der(T) = port.Q_flow;
   end Warm;
@@ -360,6 +362,38 @@ package Parts "Components by their textbook equations, in the units and connecto
   algorithm
     y := v;
   end Stepwise;
+  model Assigned
+    extends Capacitor;
+  initial algorithm
+    v := 5;
+  end Assigned;
+  model Alias "Starts at 3 V, by the name that is no state"
+    extends Branch(v(start = 3, fixed = true));
+    Real u(unit = "V");
+  equation
+    u = v;
+    i = der(u);
+  end Alias;
+  model Placed
+    extends Inertia(phi(start = 1, fixed = true));
+  end Placed;
+  model Standing "Where all is that nobody places"
+    extends Inertia(phi(start = 0, fixed = true), w(start = 1, fixed = true));
+  end Standing;
+  model Risen
+    extends Warm(rise(fixed = true));
+  end Risen;
+  function exp
+    input Real x;
+    output Real y;
+  algorithm
+    y := 2*x;
+  end exp;
+  model Doubled
+    extends Branch;
+  equation
+    v = exp(1)*i;
+  end Doubled;
   model Unsaid
     extends Branch;
     parameter Real R;

@@ -20,6 +20,7 @@ TAKEN = {
     "Transformer": {},
     "Machine": {},
     "Inertia": {},
+    "Standing": {},
     "Spring": {},
     "Spring, damped": {"d": 0.6},
     "Gear": {},

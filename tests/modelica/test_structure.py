@@ -26,7 +26,7 @@ def flat_of(loss, skew, constraint, mix):
     units = (
         {port.potential: "V" for port in ports} | {port.flow: "A" for port in ports} | dict.fromkeys(multipliers, "")
     )
-    return Flat("any", ports, tuple(ZeroResidual(sympy.expand(each), str(each)) for each in residuals), units, {})
+    return Flat("any", ports, tuple(ZeroResidual(sympy.expand(each), str(each)) for each in residuals), units, {}, {})
 
 
 def numbers(draw, rows, columns):
