@@ -11,15 +11,15 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_600,
     "ephs/exporting": 13_600,
-    "ephs/mechanics": 424_100,
+    "ephs/mechanics": 424_000,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
-    "ephs/semantics": 196_000,
+    "ephs/semantics": 196_200,
     "ephs/show": 64_400,
-    "ephs/solve": 127_200,
+    "ephs/solve": 127_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 566_300,
+    "tests": 556_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
