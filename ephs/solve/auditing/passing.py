@@ -16,6 +16,7 @@ from ephs.solve.auditing.resolution import STILL
 from ephs.solve.auditing.rounding import trembling
 from ephs.solve.equations.instant import instant, rates_read
 from ephs.solve.equations.oscillations import oscillations
+from ephs.solve.posing.errors import SolveError
 from ephs.solve.posing.problem import Problem
 
 if TYPE_CHECKING:
@@ -56,7 +57,8 @@ class Passed:
 def passed_over(solution: "Solution", h: float, allowed: float) -> Passed | None:
     """Oscillations that steps of h s pass over, with energy before and after them; None where there are none.
 
-    Where that is more than is allowed, as a part of the gross energies, the whole balances of momenta are asked.
+    Where that is more than is allowed, as a part of the gross energies, the rates of all momenta are asked: what is
+    stretched without moving back is no oscillation.
     """
     problem = solution.problem
     if problem is None or len(solution) < 2 or not _may_be(solution, h):
@@ -78,11 +80,14 @@ def passed_over(solution: "Solution", h: float, allowed: float) -> Passed | None
     return worst
 
 
-def _pull(solution: "Solution", problem: Problem, i: int) -> Array:
-    """(effort_size,) rates of momenta at the i-th instant, in N or N m; of other states, too."""
+def _pull(solution: "Solution", problem: Problem, i: int) -> Array | None:
+    """(effort_size,) rates of momenta at the i-th instant, in N or N m; of other states, too. None if not known."""
     d, state = problem.descriptor, solution.state_at(i)
     x = d.pack(state)
-    found = instant(d, problem.reference, x, problem.inputs(float(solution.t[i]), state)).rates
+    try:
+        found = instant(d, problem.reference, x, problem.inputs(float(solution.t[i]), state)).rates
+    except (SolveError, np.linalg.LinAlgError):  # no finite numbers, or no balance: the finding stays
+        return None
     rates, out = np.concatenate([found[slot.path] for slot in d.states]), np.zeros(d.effort_size)
     for slot, _ in d.storages:
         out[list(slot.efforts)] = rates[rates_read(slot)]
