@@ -15,6 +15,7 @@ import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
+from ephs.mechanics.methods.tableaux import MIDPOINT
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.posing.errors import OptionError, Outcome, SolveError
@@ -88,7 +89,8 @@ class Ida(ReducedMethod):
         eq, plain = self.equations, self.equations.heats.plain
         first = eq.size - len(eq.reduced.made)
         # What IDA counts of friction's heat falls by its error where there is little: what was counted most stays.
-        counted, friction = y.copy(), first + eq.heats.frictions
+        sink = eq.reduced.tables.sink
+        counted, friction = y.copy(), first + sink[sink[:, 3] > 0, 0]
         counted[friction] = np.maximum(y[friction], self._y[friction])
         passed, self._y = counted - self._y, counted
         nv, n, ns = eq.nv, eq.n, eq.ns
@@ -98,10 +100,9 @@ class Ida(ReducedMethod):
             base, ReducedState(t, eq.advance(base.q, v), r, heats, state.totals, account=state.account)
         )
         closed = eq.closed(free)
-        # Its sums are its own: a sum that is off by rounding, of a component that makes nothing, refuses no step.
-        flows = passed[first:]
-        work, heat = passed[first - 2 : first].tolist()
-        closed = eq.booking.step(state, closed, flows, work, heat, missed=0.0 * flows, refused=False)
+        change, flows = np.concatenate([np.zeros(nv + n), passed[nv + n :]]), passed[first:]
+        change[nv + n : nv + n + ns] = np.where(plain, heats - state.heats, eq.heats.taken(state.heats, flows)[0])
+        closed = eq.accounts.summed(state, closed, MIDPOINT, change[None], 1.0)
         # It continues from its own state, so corrections are applied to each returned state.
         since = np.concatenate([base.account[: eq.accounts.own], state.account[eq.accounts.own :]])
         allowed = self.atol + self.rtol * eq.sizes(eq.vector(state), eq.vector(closed))
