@@ -11,7 +11,7 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_600,
     "ephs/exporting": 13_600,
-    "ephs/mechanics": 424_000,
+    "ephs/mechanics": 424_400,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
     "ephs/semantics": 196_200,
@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 127_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 556_700,
+    "tests": 556_900,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

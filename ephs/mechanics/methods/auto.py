@@ -16,6 +16,7 @@ from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.methods.marching import FAILING, LAGGED
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.rounding import LOOKED, held_by_rounding
 from ephs.mechanics.methods.semi import NAME as SEMI
 from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs, scheme_of
@@ -119,9 +120,12 @@ class Auto(ReducedMethod):
         if found.error <= 1.0:
             near: Any = self._nearness[0]
             self._failures = 0
-            near.stiff = self._explicit.stiffness
-            if held_back(PLAIN, near):
-                self._switch(found.end.t, h, f"h·|λ| = {near.stiff:.1f} holds its steps")
+            near.stiff, near.steps = self._explicit.stiffness, near.steps + 1
+            told = None
+            if near.steps % LOOKED == 0 and self.control.step is None:
+                told = held_by_rounding(self._explicit, found.end, abs(h), near.span, near.span / abs(h))
+            if told or held_back(PLAIN, near):
+                self._switch(found.end.t, h, told or f"h·|λ| = {near.stiff:.1f} holds its steps")
         return found
 
     def tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
@@ -131,6 +135,7 @@ class Auto(ReducedMethod):
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
         """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones while they pay."""
         self._forward(span.until >= span.t0)
+        self._nearness[0].span = abs(span.until - span.t0)
         contest = self._contest
         if contest is not None:
             self._take(self._names[contest.at])
@@ -172,7 +177,10 @@ class Auto(ReducedMethod):
         """Memory of its methods, and what their choice depends on."""
         return {
             "methods": {name: method.snapshot(state) for name, method in self._methods.items()},
-            "nearness": [int(self._nearness[0].held), int(self._nearness[0].free), self._failures],
+            "nearness": [
+                *(int(getattr(self._nearness[0], name)) for name in ("held", "free", "steps")),
+                self._failures,
+            ],
             "contest": None if self._contest is None else self._contest.snapshot(),
             "active": self._active.name,
             "name": self.name,
@@ -189,7 +197,7 @@ class Auto(ReducedMethod):
             self._contest.restore(own["contest"])
         self._take(own["active"])
         near: Any = self._nearness[0]
-        near.held, near.free, self._failures = own["nearness"]
+        near.held, near.free, near.steps, self._failures = own["nearness"]
         self.name = own["name"]
 
 

@@ -1,5 +1,6 @@
 """Many steps of a mechanism in one compiled call, if no step needs Python."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, final
 
@@ -7,12 +8,13 @@ import numpy as np
 
 from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.rounding import LOOKED, warn_of_rounding
+from ephs.mechanics.methods.rounding import LOOKED, held_by_rounding
 from ephs.mechanics.methods.stages import KeptJacobian
 from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundles.bundle import Array
+from ephs.solve.auditing.findings import CostWarning
 from ephs.solve.march.account import RunAccount
 from ephs.solve.march.control import DAMPING, PATIENCE, STRICT
 from ephs.solve.march.records import Ending, MarchControl, Status
@@ -145,7 +147,11 @@ class March:
             self._kept.count()
         self._hold(sound)
         if self.explicit and c.steps >= self._look and not c.grid:
-            self._look *= LARGEST if warn_of_rounding(self.method, self.state, c) else 2
+            self._look *= 2
+            many = c.steps * c.span / c.time
+            if told := held_by_rounding(self.method, self.state, float(c.step), float(c.span), many):
+                self._look = LARGEST
+                self._leave_rounding(told)
         self.method.stiffness = float(c.stiff)
         if found == Ending.CAREFUL or (self._kept is not None and found >= Ending.REFUSED):
             self._step()
@@ -156,6 +162,20 @@ class March:
         elif found >= Ending.REFUSED:
             self._refused(found - Ending.REFUSED)
         return found == Ending.DONE
+
+    def _leave_rounding(self, told: str) -> None:
+        """Leave explicit steps that rounding holds short to others, or tell a user.
+
+        Warns
+        -----
+        CostWarning
+            There are no others.
+        """
+        if self.control.limit > 0.0 and self._contest is None and self._leave is not None:
+            self._leave(self.time, float(self.control.step), told)
+            self.left = True
+        else:
+            warnings.warn(f"{told}; loosen atol and rtol", CostWarning, stacklevel=2)
 
     def _hold(self, sound: float) -> None:
         """Discard rows with overflow; ``sound``: the time before.

@@ -5,15 +5,13 @@ Rounding of the state can change it by more than the tolerance of a step. As the
 length, the number of steps grows without a gain in accuracy.
 """
 
-import warnings
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.auditing.findings import CostWarning
 from ephs.solve.posing.errors import worst_entry
 
 if TYPE_CHECKING:
@@ -36,35 +34,29 @@ def rate_rounding(equations: ReducedEquations, state: ReducedState) -> Array:
     return np.abs(equations.rates(state.t, state.q, turned) - before)[equations.counted]
 
 
-def warn_of_rounding(method: "ReducedMethod", state: ReducedState, march: Any) -> bool:
-    """Tell a user that rounding is what holds the steps of a long run short; whether it is.
+def held_by_rounding(method: "ReducedMethod", state: ReducedState, h: float, span: float, steps: float) -> str | None:
+    """What is told where rounding is what holds the steps of a long run short; None where it is not.
+
+    It names the rate that is rounded most beside its tolerance.
 
     Parameters
     ----------
-    march
-        The record of `MarchControl`: time, span, steps and the next one.
-
-    Warns
-    -----
-    CostWarning
-        It names the rate that is rounded most beside its tolerance.
+    h, span
+        The next step, and the whole run, in s.
+    steps
+        That the run will take, about.
     """
-    steps, h = march.steps * march.span / march.time, float(march.step)
     if steps < MANY:
-        return False
+        return None
     eq = method.equations
     y = eq.vector(state)
-    shared = (march.span / h) ** method.share * h / (method.atol + method.rtol * eq.sizes(y, y))
+    shared = (span / h) ** method.share * h / (method.atol + method.rtol * eq.sizes(y, y))
     felt = rate_rounding(eq, state) * shared
     worst = worst_entry(felt)
-    found = bool(felt[worst] >= FELT)
-    if found:
-        path, what = counted(eq.reduced, worst)
-        what = what.replace("its", "the")
-        warnings.warn(
-            f"{method.name} will take about {steps:.1g} steps: rounding of {what} of {path} is {felt[worst]:.1g} times "
-            "what these tolerances leave to a step; loosen atol and rtol",
-            CostWarning,
-            stacklevel=2,
-        )
-    return found
+    if not felt[worst] >= FELT:
+        return None
+    path, what = counted(eq.reduced, worst)
+    return (
+        f"{method.name} will take about {steps:.1g} steps: rounding of {what.replace('its', 'the')} of {path} is "
+        f"{felt[worst]:.1g} times what these tolerances leave to a step"
+    )

@@ -50,6 +50,11 @@ class ShellMotion:
     shear: Array
     energy: Array
 
+    @property
+    def bending(self) -> Array:
+        """(n, elements, 3) the moments."""
+        return self.moment
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Self, final
 
 import numpy as np
-from pydantic import Field, PrivateAttr, TypeAdapter, WrapValidator
+from pydantic import Field, PrivateAttr, TypeAdapter, WrapValidator, model_validator
 
 from ephs.mechanics.elements.shell.section import ShellSection
 from ephs.mechanics.elements.shell.shell import Shell
@@ -17,6 +17,7 @@ from ephs.mechanics.scene.layers import Layers, laminate, rescaled_layers
 from ephs.mechanics.scene.meshes import MeshError, SheetMesh, mesh_of
 from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Flag, NonNegative, Number, Positive, Text, Vector
+from ephs.mechanics.scene.sheets import level_table
 from ephs.mechanics.scene.site import Site
 from ephs.mechanics.scene.text import file_inside
 from ephs.semantics.bundles.bundle import Array
@@ -26,7 +27,6 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 NEAR = 1e-6
 """Distance of a point from a node of a beam that is there, by the size of the sheet."""
-CREASE = float(np.pi / 6.0)
 _MATERIAL = ("thickness", "E", "nu", "rho")
 _WAYS = ({"corners", "elements"}, {"points", "elements", "sides"}, {"file", "sides"})
 _Count = Annotated[int, Field(strict=True, ge=1)]
@@ -69,9 +69,7 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
     file: Text | None = key("mesh file in the folder of this file, or below; m, in the world", None)
     sides: list[Side] | None = key("of a mesh: points of each side, or the name of a set of points in the file", None)
     crease: Positive = key(
-        "angle from the mean normal of its neighbours beyond which an element has its own at a corner, {}",
-        CREASE,
-        unit="rad",
+        "angle in degrees from the mean normal of its neighbours beyond which an element has its own at a corner", 30.0
     )
     thickness: Positive | None = key("of one material", None, unit="m")
     E: Positive | None = key("Young's modulus", None, unit="Pa")
@@ -103,6 +101,7 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
     )
     twists: list[_Twist] | None = key("of its points at the start, in their axes, rad/s and m/s; default: 0", None)
     _read: SheetMesh | None = PrivateAttr(None)
+    _one_level = model_validator(mode="before")(level_table)
 
     @rule(
         *_MATERIAL, "layers", at="", found="{found}", expected="thickness, E and rho, or layers with a density",
@@ -309,7 +308,7 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
     def shell(self) -> Shell:
         """Its mesh without stress."""
         mesh = self.mesh()
-        return Shell.of(mesh.points, mesh.cells, self.stack(), crease=self.crease, along=self.along)
+        return Shell.of(mesh.points, mesh.cells, self.stack(), crease=float(np.radians(self.crease)), along=self.along)
 
     def start(self) -> tuple[Array, Array]:
         """(m, 7) poses and (m, 6) twists of its points at the start."""

@@ -23,7 +23,7 @@ from ephs.solve.result.durable import sync_folder
 from ephs.solve.result.record import UNSOLVED, RunRecord, joined
 from ephs.solve.running.snapshot import Snapshot, parts
 
-FORMAT = 4
+FORMAT = 5
 MAGIC = b"ephs run"
 EVERY = 0.5
 """Seconds between two entries."""

@@ -39,6 +39,41 @@ def meshed(points, cells, **keys):
     return scene(table("corners", "edges", points=np.asarray(points).tolist(), elements=cells, **keys))
 
 
+# ---- tables inside ---------------------------------------------------------------------------------------------------
+
+INSIDE = {
+    "a grid": (
+        table(*MATERIAL, "corners", "elements", grid=f"{{corners = {SHEET['corners']}, elements = [3, 2]}}",
+              section="{thickness = 4e-3, E = 2e7, nu = 0.3, rho = 900.0}", edges='{left = "ground"}'),
+        table(pinned="[false, false, false, false]"),
+    ),
+    "joints along sides": (
+        table(edges='{bottom = {body = "ground", joint = "revolute"}, top = {body = "ground", joint = "fixed"}}'),
+        table(edges='["ground", "free", "ground", "free"]', pinned="[true, false, false, false]"),
+    ),
+    "layers": (
+        table(*MATERIAL, layers="[{thickness = 1e-3, E = [3e7, 1e7], G = 4e6, nu = 0.3, angle_deg = 90, rho = 9e2}]"),
+        table(*MATERIAL, layers=f"[{LAYER.replace('ANGLE', str(np.pi / 2.0))}]"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", INSIDE)
+def test_tables_inside_a_sheet_say_the_same_as_its_keys(name):
+    inside, level = (scene(keys).shells["skin"] for keys in INSIDE[name])
+    assert inside.model_dump() == level.model_dump()
+
+
+def test_what_is_no_table_inside_a_sheet_is_refused_by_its_key():
+    for keys, key in (
+        ({"grid": "{corners = 1, sides = 2}"}, "grid"), ({"section": "{E = 1.0, G = 2.0}"}, "section"),
+        ({"grid": "{elements = [3, 2]}"}, "grid"), ({"edges": '{north = "ground"}'}, "edges"),
+        ({"edges": '{left = {body = "ground", joint = "screw"}}'}, "edges"),
+    ):  # fmt: skip
+        with pytest.raises(ephs.SceneError, match=rf"shells\.skin\.{key}: found "):
+            scene(table(**keys))
+
+
 # ---- layers ----------------------------------------------------------------------------------------------------------
 
 
