@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 127_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 556_900,
+    "tests": 557_100,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

@@ -21,6 +21,7 @@ from ephs.operad import Path
 from ephs.semantics.spaces import SE3, pair
 from ephs.solve.methods.solvers import Solvers, dissected
 from ephs.testing import mechanisms
+from tests.mechanics.elements.shell.test_shell_scenes import sheet
 from tests.mechanics.tree.general import held_to_the_general_form
 from tests.numerics import EPS, generators, largest, seeds
 from tests.scenes import equations_of
@@ -260,3 +261,12 @@ def test_rates_of_elements_are_differences_of_their_poses():
         rate = (steps[0] - 8.0 * steps[1] + 8.0 * steps[2] - steps[3]) / (12.0 * 5e-5)
         found = motion.rate(Path.of(path))[middle]
         assert largest(found - rate) <= 1e-4 * max(largest(rate), 1e-3)
+
+
+@pytest.mark.parametrize("pressure", [{}, {"pressure": "0.0"}], ids=["many steps a call", "one step a call"])
+def test_auto_leaves_steps_of_thin_sheets_that_rounding_holds_short(pressure):
+    stiff = {"thickness": "2e-3", "E": "7e10", "rho": "2700.0", "damping": "0.0", "elements": "[2, 2]"}
+    with pytest.raises(ephs.SimulationError) as ended:
+        ephs.simulate(sheet(**stiff, **pressure), 1e-3, max_steps=1100)
+    (switch,) = ended.value.partial.stats["switches"]
+    assert switch["to"] == "radau" and "steps: rounding of the rate of shells.skin" in switch["reason"]
