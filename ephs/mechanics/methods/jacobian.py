@@ -7,7 +7,10 @@ import numpy as np
 from ephs.mechanics.tree.engine.apart import columns_of_trees, directions
 from ephs.mechanics.tree.engine.slopes import Call, RateSlopes, calls_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
+from ephs.mechanics.tree.equations.tangent import Linearised
+from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.kept import once
 from ephs.solve.march.records import Status
 
@@ -27,9 +30,8 @@ TANGENT, MADE = 8, 100
 class Jacobian:
     """∂ẏ/∂y of y = (v, r, heats) at v = 0, by tangents.
 
-    It is made of differences where constraints nearly repeat each other, and where inputs are Python functions of the
-    state, unless it is sparse and these are soft: then their derivatives are left out, and iterations are those of an
-    inexact matrix.
+    It is made of differences where inputs are Python functions of the state, unless it is sparse and these are soft:
+    then their derivatives are left out, and iterations are those of an inexact matrix.
     With ``counts`` the matrices are counted there, as ``jacobians``; ``holding`` is what held contacts in the last one.
 
     Attributes
@@ -45,6 +47,7 @@ class Jacobian:
         self._counts = {} if counts is None else counts
         self._counts.setdefault("jacobians", 0)
         self._slopes: RateSlopes | None = None
+        self._linear: Linearised | None = None
         self.holding = equations.holding
         touches = bool(equations.reduced.tables.support.any()) or equations.problem.descriptor.strikes is not None
         self.sparse = equations.n >= MANY and not touches and self._share <= FULL
@@ -76,7 +79,7 @@ class Jacobian:
 
     def _by_tangents(self, state: ReducedState) -> "Array | csc_array | None":
         """By tangents of the rates under the inputs there, where these know no state or, of a sparse matrix, are soft;
-        None where not, and where constraints nearly repeat each other."""
+        by those of the dense equations where constraints nearly repeat each other."""
         eq = self.equations
         if not (eq.constant or eq.timed or (self.sparse and eq.problem.soft)):
             return None
@@ -85,8 +88,29 @@ class Jacobian:
         eq.load(state.t, state.q, state.r, state.heats)
         status, value = self._slopes.at(state.q, eq.vector(state))
         if status == Status.DEPENDENT:
-            return None
+            return self._of_dense(state)
         eq.refuse(status, self._slopes.failed)
+        return value
+
+    def _of_dense(self, state: ReducedState) -> Array:
+        """By tangents of the dense equations, whose rows are chosen with care; cut joints follow the tree."""
+        eq = self.equations
+        n, nv, tables = eq.n, eq.nv, eq.reduced.tables
+        self._linear = linear = self._linear or Linearised(eq)
+        warmth = eq.heats.temperatures(state.heats)
+        linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
+        columns = linear.columns(solve=True)
+        rates, found = np.concatenate([state.r, linear.cut_rates]), eq.dense.residual
+        value, heat = np.zeros((self.size, self.size)), slice(nv + n, self.size)
+        value[:n, nv : nv + n] = np.eye(n)
+        value[n:nv], value[nv : nv + n], value[heat] = columns[n:nv], columns[:n], columns[nv:]
+        value[:, heat] /= warmth  # ds = dE/θ, and Ė = θ ṡ
+        value[heat] *= warmth[:, None]
+        value[heat, heat] += np.diag(found.out[found.entropy_rates] * eq.heats.slopes())
+        for i, edge in enumerate(eq.reduced.edges):
+            if tables.kind[i] != SPRING and tables.code[i] != VECTOR:  # v̇ = dexp⁻¹(v) r turns with v: r + ½ [v, r] + …
+                where = slice(int(tables.r_at[i]), int(tables.r_at[i] + tables.dim[i]))
+                value[where, where] -= 0.5 * edge.pair.manifold.ad(rates[where])
         return value
 
     @property
