@@ -11,7 +11,7 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_600,
     "ephs/exporting": 13_600,
-    "ephs/mechanics": 424_400,
+    "ephs/mechanics": 424_800,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
     "ephs/semantics": 196_200,

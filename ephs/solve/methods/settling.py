@@ -31,6 +31,8 @@ from ephs.solve.running.snapshot import parts
 ANCHOR, LEFT, PUT, TOTAL, HEAT, CARRY, MISSED = range(7)
 """Numbers of a state's account: those of `RunAccount`; the heat in J that went to stores of heat, less what entropies
 missed, and its rounding; what entropies missed."""
+STILL = 1e-12
+"""Part of the power into a storage below which that into its other states than entropies is rounding."""
 
 
 def _stored_energies(
@@ -175,9 +177,9 @@ class Settling:
         return (found.unknowns[self._efforts] + self._intensive) * found.unknowns[self._rates]
 
     def missed(self, weights: Array, powers: Array, change: Array) -> float:
-        """Energy in J by which entropies miss what passed in a step.
+        """Energy in J by which entropies miss what passed in a step, of storages that nothing else changes.
 
-        What a storage misses is shared by how much passed through each of its states.
+        Others are moved along what else changes in them.
 
         Parameters
         ----------
@@ -191,8 +193,8 @@ class Settling:
         passed = np.bincount(self._owners, weights @ powers, self.mixed.size)
         sizes = abs(weights).max() * abs(powers).sum(axis=0)
         whole = np.bincount(self._owners, sizes, self.mixed.size)
-        thermal = np.bincount(self._owners, sizes * self._thermal, self.mixed.size)
-        return float((change - passed) @ (thermal / np.maximum(whole, TINY)))
+        other = np.bincount(self._owners, sizes * (1.0 - self._thermal), self.mixed.size)
+        return float((change - passed) @ (other <= STILL * whole))
 
     def settled(
         self, account: Array, start: Array, x: Array, directions: Callable[[], Array], allowed: Array, work: float,
