@@ -143,8 +143,7 @@ class Settling:
                 environment = isinstance(slot.primitive, Storage) and slot.primitive.environment
                 weights[state.point] = model.reference.intensive(state.quantity) if environment else 0.0
         self.active = bool(counted.size)
-        hot = t.entropy[t.e_index] == 1.0
-        self.mixed = counted[[bool(hot[t.e_at[i] : t.e_at[i] + t.dims[i, 0]].any()) for i in counted.tolist()]]
+        self.mixed = counted[[bool(t.entropy[efforts_of(t, counted[k : k + 1])].any()) for k in range(counted.size)]]
         self._rates, efforts = rates_of(t, self.mixed), efforts_of(t, self.mixed)
         self._efforts, self._intensive = int(t.counts[0]) + efforts, t.intensive[efforts]
         self._thermal, self._owners = t.entropy[efforts], np.repeat(np.arange(self.mixed.size), t.dims[self.mixed, 0])
