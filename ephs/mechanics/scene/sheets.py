@@ -36,15 +36,14 @@ def level_table(table: Any) -> Any:
 
 
 def _level_layer(layer: Any) -> Any:
-    """A layer with a number for each direction, and its angle in rad."""
-    if not isinstance(layer, Mapping):
+    """A layer whose ``E`` has both directions with a number for each, and its angle in rad."""
+    both = layer.get("E") if isinstance(layer, Mapping) else None
+    if not isinstance(both, list) or len(both) != 2 or {"E1", "E2"} & layer.keys():
         return layer
-    out: dict[str, Any] = dict(layer)
+    out: dict[str, Any] = {key: x for key, x in layer.items() if key != "E"} | {"E1": both[0], "E2": both[1]}
     for short, long in PLY.items():
         if short in out and long not in out:
             out[long] = out.pop(short)
-    if isinstance(out.get("E"), list) and len(out["E"]) == 2 and not {"E1", "E2"} & out.keys():
-        out["E1"], out["E2"] = out.pop("E")
     if isinstance(out.get("angle_deg"), int | float) and "angle" not in out:
         out["angle"] = radians(out.pop("angle_deg"))
     return out
