@@ -92,7 +92,7 @@ def _ideal(flat: Flat, residuals: list[Expr]) -> Primitive | None:
 
 
 def flowless(ports: Interface) -> Reversible:
-    """What takes nothing at its ports."""
+    """Equations of zero flow at all ports."""
     n = len(ports)
     return constant_structure("open", ports, np.zeros((n, n)), np.zeros((0, n)))
 

@@ -175,12 +175,10 @@ class Auto(ReducedMethod):
 
     def taken(self, state: ReducedState) -> Snapshot:
         """Memory of its methods, and what their choice depends on."""
+        near: Any = self._nearness[0]
         return {
             "methods": {name: method.snapshot(state) for name, method in self._methods.items()},
-            "nearness": [
-                *(int(getattr(self._nearness[0], name)) for name in ("held", "free", "steps")),
-                self._failures,
-            ],
+            "nearness": [int(near.held), int(near.free), int(near.steps), self._failures],
             "contest": None if self._contest is None else self._contest.snapshot(),
             "active": self._active.name,
             "name": self.name,

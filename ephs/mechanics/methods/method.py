@@ -101,8 +101,8 @@ class ReducedMethod(ABC):
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
         """A shorter step from the same start, or several where that fails or errs: dense output of full order.
 
-        Where a method has `tried`, heat and the entropies that components made are between those of the instant before
-        and those of the whole step.
+        With `tried`, heat and entropy production of components lie between their values at the previous instant and
+        at the end of the step.
         """
         start, h, low = attempt.start, t - attempt.start.t, self._low
         if attempt.detail is None:

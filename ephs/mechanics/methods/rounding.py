@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.methods.method import ReducedMethod
 
 LOOKED: Final = 1024
-"""Steps before a run is looked at; doubled for each further look."""
+"""Steps before a run is looked at, and between further looks at least."""
 MANY: Final = 20_000
 """Steps from which on a run counts as long."""
 EPSILON: Final = float(np.finfo(float).eps)
@@ -35,7 +35,7 @@ def rate_rounding(equations: ReducedEquations, state: ReducedState) -> Array:
 
 
 def held_by_rounding(method: "ReducedMethod", state: ReducedState, h: float, span: float, steps: float) -> str | None:
-    """What is told where rounding is what holds the steps of a long run short; None where it is not.
+    """Warning text for a long run whose steps rounding holds short; None for other runs.
 
     It names the rate that is rounded most beside its tolerance.
 
@@ -44,7 +44,7 @@ def held_by_rounding(method: "ReducedMethod", state: ReducedState, h: float, spa
     h, span
         The next step, and the whole run, in s.
     steps
-        That the run will take, about.
+        Expected number of steps of the run.
     """
     if steps < MANY:
         return None

@@ -57,8 +57,8 @@ class Passed:
 def passed_over(solution: "Solution", h: float, allowed: float) -> Passed | None:
     """Oscillations that steps of h s pass over, with energy before and after them; None where there are none.
 
-    Where that is more than is allowed, as a part of the gross energies, the rates of all momenta are asked: what is
-    stretched without moving back is no oscillation.
+    Energies above the allowed part of the gross energies are checked by the rates of all momenta: a spring that is
+    stretched without a force that moves it back does not oscillate.
     """
     problem = solution.problem
     if problem is None or len(solution) < 2 or not _may_be(solution, h):

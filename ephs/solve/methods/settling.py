@@ -190,7 +190,7 @@ class Settling:
             (storages with entropies,) of their energies in J.
         """
         passed = np.bincount(self._owners, weights @ powers, self.mixed.size)
-        sizes = abs(weights).max() * abs(powers).sum(axis=0)
+        sizes = abs(powers).sum(axis=0)
         whole = np.bincount(self._owners, sizes, self.mixed.size)
         other = np.bincount(self._owners, sizes * (1.0 - self._thermal), self.mixed.size)
         return float((change - passed) @ (other <= STILL * whole))
