@@ -13,9 +13,8 @@ from ephs.exporting.errors import ExportError
 from ephs.exporting.image import ImageNumber, image_of
 from ephs.exporting.linking import webassembly
 from ephs.exporting.module import exported
-from ephs.mechanics.motion.shells import nodes_of
 from ephs.mechanics.runs.simulate import simulate
-from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.scene.build import component_path, nodes_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import names, read
 from ephs.show.motions.player import player

@@ -136,7 +136,7 @@ def test_pressures_are_no_part_of_the_system_but_ports_where_they_act():
     """
     at_rest, blown = scene_of_text(text), scene_of_text(text + "pressure = 20.0\n")
     assert not set(at_rest.system().interface)
-    assert set(map(str, blown.system().interface)) == {"momenta.sheet-node2", "momenta.sheet-node3"}
+    assert set(map(str, blown.system().interface)) == {"momenta.sheet.2", "momenta.sheet.3"}
 
 
 @settings(calm, max_examples=30)

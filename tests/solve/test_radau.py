@@ -200,6 +200,24 @@ def test_what_entropies_of_large_stores_miss_moves_nothing_beside_them(energy, s
     assert missed(beside, **volumes) > 10.0 * plain or step > 0.1, "the control"
 
 
+def test_what_an_environment_takes_from_outside_costs_no_steps():
+    """Its energy is linear in its entropy, so that its entropy misses nothing, also where a port supplies it."""
+    text = f"s: entropy, exposed; {OSCILLATING}; mf(p, s); env(s)"
+    system = Pattern.from_text(text)(
+        pe=library.spring(k=1.0),
+        ke=library.point_mass(m=1.0),
+        pkc=library.pkc(),
+        mf=library.friction(d=0.1),
+        env=library.environment(),
+    )
+    sol = ephs.simulate(
+        system, 2.0, initial={"pe.q": 1.0}, inputs={"s": {"flow": lambda t: 0.3 + np.sin(t)}}, method="radau", rtol=1e-8
+    )
+    assert sol.stats["steps"] < 200
+    supplied = 0.3 * 2.0 + 1.0 - np.cos(2.0)
+    assert float(sol["env.s"][-1]) == pytest.approx(supplied + sol.heat[-1] / 293.15, rel=1e-9)
+
+
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
 def test_the_error_keeps_to_the_tolerance(tolerance):
     system, _, start, _ = EXAMPLES["cylinder and piston"]

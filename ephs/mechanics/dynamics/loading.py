@@ -9,9 +9,8 @@ from ephs.mechanics.dynamics.links import PlacedLinks
 from ephs.mechanics.dynamics.opening import HardContacts
 from ephs.mechanics.dynamics.results import Derivatives
 from ephs.mechanics.elements.shell.pressure import area_slopes, node_areas
-from ephs.mechanics.scene.build import component_path, wrench_port
+from ephs.mechanics.scene.build import body_box, wrench_port
 from ephs.mechanics.scene.loads import Load
-from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.shells import ShellSheet
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
@@ -28,7 +27,7 @@ class PressedSurface:
     def __init__(self, equations: ReducedEquations, sheet: ShellSheet) -> None:
         assert sheet.pressure is not None
         self._residual, self._pressure, self._cells = equations.dense.residual, sheet.pressure, sheet.mesh().cells
-        self._n, self._start, self._nodes = equations.n, sheet.start()[0][:, 4:], sheet.pushed()
+        self._n, self._start, self._nodes = equations.n, sheet.start()[0][:, 4:], sheet.moving()
         frames = {one.port: one.frame for one in equations.reduced.acting}
         found = [frames[wrench_port(sheet.node(node))] for node in self._nodes]
         self._links, self._offsets = [frame.link for frame in found], np.array([frame.offset[4:] for frame in found])
@@ -81,7 +80,7 @@ class Loading:
     def __init__(self, equations: ReducedEquations, links: PlacedLinks) -> None:
         self.share, self.hard = 1.0, HardContacts(equations)
         self._equations, self._links = equations, links
-        scene: Scene | None = equations.problem.scene
+        self._scene = scene = equations.problem.scene
         self._loads: dict[str, list[Load]] = {}
         for _, load in () if scene is None else scene.all_loads():
             self._loads.setdefault(load.body, []).append(load)
@@ -137,7 +136,8 @@ class Loading:
         pose, more = SE3.compose(self._equations.dense.residual.pose(self._pushed[name]), by), self.share - 1.0
         whole = self._constant[self._pushed[name]]
         if name in self._turning:
-            whole = self._turning[name].at(np.inf, {component_path("bodies", name) / "pe" / "q": pose})
+            assert self._scene is not None
+            whole = self._turning[name].at(np.inf, {body_box(self._scene, name) / "pe" / "q": pose})
         turn = quaternion_to_matrix(pose[:4])
         return whole + sum((more * load.wrench(turn) for load in self._loads.get(name, ())), np.zeros(6))
 

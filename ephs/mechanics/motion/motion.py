@@ -19,8 +19,8 @@ from ephs.mechanics.motion.moving import ByPath, Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
 from ephs.mechanics.motion.readout import freedoms_of, summary, variables
 from ephs.mechanics.motion.reduced import motion_of
-from ephs.mechanics.motion.shells import ShellMotion, nodes_of, shell_motion, with_nodes
-from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.motion.shells import ShellMotion, shell_motion, with_nodes
+from ephs.mechanics.scene.build import body_box, component_path, nodes_of
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.mechanics.tree.finding.tendons import length_errors
@@ -162,7 +162,7 @@ class SceneMotion:
     # ---- reading -----------------------------------------------------------------------------------------------
 
     def body(self, name: str) -> BodyMotion:
-        """The motion of a body; of a node of a shell, too, by the name that pictures have for it."""
+        """The motion of a body, or of a node of a shell."""
         if name not in self._nodes:
             self._scene.body(name)
         return BodyMotion(self, name)
@@ -222,7 +222,7 @@ class SceneMotion:
         """(n, 7) of a body, or of the ground."""
         if name == GROUND:
             return np.broadcast_to(SE3.identity(), (len(self._solution), 7))
-        return self._solution[self._nodes.get(name, component_path("bodies", name)) / "pe" / "q"]
+        return self._solution[body_box(self._scene, name) / "pe" / "q"]
 
     def coordinates(self, name: str) -> Array:
         """(n, d) of a joint: of the pose of C2 in C1, in the axes of C1."""

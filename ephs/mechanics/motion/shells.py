@@ -10,10 +10,9 @@ import numpy as np
 from ephs.mechanics.elements.shell.mesh import Indices
 from ephs.mechanics.elements.shell.system import SPRING
 from ephs.mechanics.motion.batch import compose
-from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
 from ephs.mechanics.scene.faces import Faces
-from ephs.mechanics.scene.model import Body, Scene, frozen
+from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.shells import ShellSheet
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frame, Frames, LinkJoint
@@ -156,21 +155,9 @@ def shell_motion(
     return ShellMotion(poses[..., 4:], shell.cells, found[..., :3], found[..., 3:6], found[..., 6:], energy)
 
 
-def nodes_of(scene: Scene) -> dict[str, Path]:
-    """The free nodes of its shells: name in pictures -> path of the box."""
-    return {
-        f"{name.removesuffix(sheet.name)}{sheet.node(i)}": component_path("shells", name) / f"node{i}"
-        for name, sheet in scene.all_shells()
-        for i in sheet.free()
-    }
-
-
 def with_nodes(scene: Scene) -> Scene:
     """The scene with the free nodes of its shells as bodies, for pictures."""
     parts, bodies = {name: with_nodes(part) for name, part in scene.parts.items()}, dict(scene.bodies)
     for sheet in scene.shells.values():
-        shell, (poses, twists) = sheet.shell(), sheet.start()
-        for i in sheet.free():
-            tensor, mass = frozen(np.diag(shell.inertia[i, :3])), float(shell.inertia[i, 3])
-            bodies[sheet.node(i)] = Body(sheet.node(i), mass, tensor, frozen(poses[i]), frozen(twists[i]))
+        bodies |= sheet.bodies()
     return replace(scene, bodies=bodies, parts=parts)

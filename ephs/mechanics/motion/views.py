@@ -11,10 +11,11 @@ from typing import Generic, TypeVar, final
 
 import numpy as np
 
-from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.scene.build import body_box, component_path
 from ephs.mechanics.scene.kinematics import AssemblyJoint, twist
 from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.model import GROUND, Scene
+from ephs.mechanics.scene.site import nodes_of_shells
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.tree.equations.reading import JointStates
@@ -157,13 +158,15 @@ class Names:
         for link in now.links:  # a joint takes precedence over an implicit one of its name
             self.links.setdefault(link.name, link)
         self.axial = {name: _axial_rows(link) for name, link in self.links.items() if _axial(link)}
-        self.number = {name: i for i, name in enumerate(now.names)}
         self.implicit = {name for name, _ in scene.implicit_joints()} - {name for name, _ in scene.all_joints()}
         self.split = {name for name, j in scene.all_joints() if j.middle is not None}
         self.markers: dict[str, Marker] = dict(scene.all_markers())
         self.nodes: dict[str, ThermalNode] = dict(scene.all_thermal())
-        self.inverse = [_inverse_inertia(body.mass, body.inertia) for body in now.bodies]
-        self.light = [i for i, body in enumerate(now.bodies) if not body.mass > 0.0]
+        bodies = dict(zip(now.names, now.bodies, strict=True)) | dict(nodes_of_shells(scene))
+        self.number = {name: i for i, name in enumerate(bodies)}
+        self.boxes = [body_box(scene, name) for name in bodies]
+        self.inverse = [_inverse_inertia(body.mass, body.inertia) for body in bodies.values()]
+        self.light = [i for i, body in enumerate(bodies.values()) if not body.mass > 0.0]
 
     def view(self, states: State) -> "StateView":
         """The view of one instant's states by path."""
@@ -251,15 +254,15 @@ class StateView(Mapping[Path, Array]):
         """(size,) the joint's stored element."""
         names = self._names
         if joint in names.implicit:
-            return self._states[component_path("bodies", joint) / "pe" / "q"]
+            return self._states[names.boxes[names.number[joint]] / "pe" / "q"]
         at = component_path("joints", joint)
         if joint in names.split:
             return np.concatenate([self._states[at / part / "pe" / "q_r"] for part in ("first", "second")])
         return self._states[at / "pe" / "q_r"]
 
     def _body(self, name: str) -> BodyState:
-        pose = self._states[component_path("bodies", name) / "pe" / "q"]
-        return BodyState(pose, self._twists[self._names.number[name]])
+        number = self._names.number[name]
+        return BodyState(self._states[self._names.boxes[number] / "pe" / "q"], self._twists[number])
 
     def _marker(self, name: str) -> MarkerState:
         marker = self._names.markers[name]
@@ -277,9 +280,9 @@ class StateView(Mapping[Path, Array]):
         """(bodies, 6) twists by momenta; of bodies without mass by their joints."""
         names = self._names
         out = np.zeros((len(names.number), 6))
-        for name, i in names.number.items():
+        for i, box in enumerate(names.boxes):
             if i not in names.light:
-                out[i] = names.inverse[i] @ self._states[component_path("bodies", name) / "ke" / "p"]
+                out[i] = names.inverse[i] @ self._states[box / "ke" / "p"]
         if names.light:
             out[names.light] = self._light_twists(out)
         return out

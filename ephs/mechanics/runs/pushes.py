@@ -10,7 +10,7 @@ from ephs.mechanics.elements.shell.pressure import node_areas
 from ephs.mechanics.motion.batch import rotations
 from ephs.mechanics.runs.signals import View, signal
 from ephs.mechanics.scene.actuators import Actuator
-from ephs.mechanics.scene.build import component_path, element_inputs, tension_port
+from ephs.mechanics.scene.build import body_box, component_path, element_inputs, nodes_of, tension_port
 from ephs.mechanics.scene.element import GROUND
 from ephs.mechanics.scene.loads import Load
 from ephs.mechanics.scene.markers import Marker
@@ -30,7 +30,7 @@ def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> tup
     """Nodes of a shell, and the wrenches there (6 · nodes,), in nodes' axes, of a pressure in Pa."""
     cells, start, at = sheet.mesh().cells, sheet.start()[0], component_path("shells", name)
     welded = {node: body for body, nodes in sheet.welds().items() for node in nodes}
-    pushed = sheet.pushed()
+    pushed = sheet.moving()
 
     def reading(node: int) -> Callable[[State], Array]:
         rest = start[node]
@@ -87,7 +87,8 @@ def scene_signals(
     forces: dict[str, Signal] = {}
     wrenches: dict[str, Signal] = {}
     others: dict[Path, Signal] = {}
-    joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
+    joints, markers = dict(scene.all_joints()), dict(scene.all_markers())
+    bodies = {*dict(scene.all_bodies()), *nodes_of(scene)}
     sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
     actuators = {f"actuators.{name}": each for name, each in scene.every("actuators")}
     sizes |= dict.fromkeys(actuators, 1)
@@ -98,7 +99,7 @@ def scene_signals(
     sizes |= {f"shells.{name}": 1 for name in blown}
     sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
     for _, load in scene.all_loads():
-        push = _of_load(load)
+        push = _of_load(scene, load)
         wrenches[load.body] = sum_of(wrenches[load.body], push) if load.body in wrenches else push
     for key, given in _single(inputs, sizes, view):
         kind, _, name = key.partition(".")
@@ -123,12 +124,14 @@ def scene_signals(
             pressures[name] = given
             continue
         if kind == "markers":
-            name, given = markers[name].body, _at_marker(markers[name], given)
+            name, given = markers[name].body, _at_marker(scene, markers[name], given)
         wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
     for name, sheet in blown.items():
         nodes, whole = pressed(scene, name, sheet, pressures[name])
         shared = Signal(_Latest(whole).at, soft=whole.soft)
-        wrenches |= {node: part_of(shared, slice(6 * i, 6 * i + 6)) for i, node in enumerate(nodes)}
+        for i, node in enumerate(nodes):
+            push = part_of(shared, slice(6 * i, 6 * i + 6))
+            wrenches[node] = sum_of(wrenches[node], push) if node in wrenches else push
     return forces, wrenches, others
 
 
@@ -177,9 +180,9 @@ class _Latest:
         return self._found
 
 
-def _at_marker(marker: Marker, force: Signal) -> Signal:
+def _at_marker(scene: Scene, marker: Marker, force: Signal) -> Signal:
     """A force in world axes at a marker as a wrench in the body's frame."""
-    pose = component_path("bodies", marker.body) / "pe" / "q"
+    pose = body_box(scene, marker.body) / "pe" / "q"
 
     def wrench(t: float, state: Mapping[Path, Array]) -> Array:
         own = quaternion_to_matrix(state[pose][:4]).T @ force.at(t, state)
@@ -188,9 +191,9 @@ def _at_marker(marker: Marker, force: Signal) -> Signal:
     return Signal(wrench)
 
 
-def _of_load(load: Load) -> Signal:
+def _of_load(scene: Scene, load: Load) -> Signal:
     """A load as a wrench in the body's frame."""
-    still, pose = np.eye(3), component_path("bodies", load.body) / "pe" / "q"
+    still, pose = np.eye(3), body_box(scene, load.body) / "pe" / "q"
 
     def wrench(t: float, state: Mapping[Path, Array]) -> Array:
         share = 1.0 if t >= load.ramp else max(t, 0.0) / load.ramp

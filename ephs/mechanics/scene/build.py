@@ -40,6 +40,24 @@ def component_path(kind: str, name: str) -> Path:
     return Path([*(word for part in parts for word in ("parts", part)), kind, last])
 
 
+def nodes_of(scene: Scene) -> Mapping[str, Path]:
+    """Boxes of the nodes of its shells that are welded to nothing, by their names; made once, kept with the scene."""
+
+    def made() -> dict[str, Path]:
+        return {
+            sheet.node(i): component_path("shells", name) / f"node{i}"
+            for name, sheet in scene.all_shells()
+            for i in sheet.free()
+        }
+
+    return once(scene, "boxes of nodes", made)
+
+
+def body_box(scene: Scene, name: str) -> Path:
+    """Box of a (dotted) body, or of a node of a shell."""
+    return nodes_of(scene).get(name) or component_path("bodies", name)
+
+
 def wrench_port(body: str) -> Path:
     """The outer port at which a wrench acts on a body."""
     return _initial_path("momenta", body)
@@ -95,7 +113,8 @@ def started_system(scene: Scene, *, driven: Iterable[str] = ()) -> System:
 
     def made() -> System:
         loaded = {load.body for _, load in scene.all_loads()}
-        loaded |= {sheet.node(node) for _, sheet in scene.all_shells() for node in sheet.pushed()}
+        blown = [sheet for _, sheet in scene.all_shells() if sheet.pressure is not None]
+        loaded |= {sheet.node(node) for sheet in blown for node in sheet.moving()}
         return scene_system(scene, driven=joints, wrenches=loaded).with_initial(initial_state(scene))
 
     return once(scene, ("started", joints), made)
@@ -181,6 +200,7 @@ def scene_names(scene: Scene) -> dict[Path, str]:
 
 def _scene_names(scene: Scene) -> dict[Path, str]:
     out: dict[Path, str] = {component_path("bodies", name): name for name, _ in scene.all_bodies()}
+    out |= {box: name for name, box in nodes_of(scene).items()}
     out |= {component_path("springs", name): name for name, _ in scene.all_springs()}
     for name, c in scene.all_contacts():
         points = range(len(contact_points(scene, c)))

@@ -27,6 +27,7 @@ FREE_END = "free"
 JOINTS: Final[tuple[str, ...]] = (AXIS, SINGLE, "joint")
 OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "body": frozenset({GROUND}),
+    "link": frozenset({GROUND}),
     "carrier": frozenset({GROUND}),
     "end": frozenset({GROUND, FREE_END}),
     "side": frozenset({GROUND, FREE_END}),
@@ -39,14 +40,17 @@ OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
 }
 """Kind of a name that refers to something -> the names that are the same in all parts."""
 HOLDERS: Final[Mapping[str, tuple[str, ...]]] = {
-    **dict.fromkeys(("body", "end", "side"), ("bodies",)),
+    **dict.fromkeys(("body", "link", "end", "side"), ("bodies",)),
     "carrier": ("bodies", "shells"),
     "node": ("thermal",),
     **dict.fromkeys(JOINTS, ("joints",)),
     "tendon": ("tendons",),
     "surface": ("surfaces",),
 }
-"""Kind of a name -> the sections that have what it refers to, as scenes do; files may name beams for sides."""
+"""Kind of a name -> the sections that have what it refers to, as scenes do; files may name beams for sides.
+
+Nodes of shells, ``SHELL.NUMBER``, are bodies for all but joints and what is joined: ``link``, ``end``, ``side``.
+"""
 POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
 """A lower bound, and whether it is excluded."""
 

@@ -171,6 +171,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "reserved": ("another name", "{reserved} have a fixed meaning; rename it"),
     "collision": ("a name that {other} does not use", "rename one of them"),
     "unknown body": ('"ground" or a body', "{hint}"),
+    "unknown node": ("a node of {first} … {last}", "correct the number"),
+    "welded node": ("a node that moves by itself", "take {body} in its place"),
     "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
     "unknown type": ("one of {known}", "{hint}"),
     "overlap": (

@@ -120,8 +120,8 @@ class Joint(Measured):
 
     name: str
     kind: str
-    body1: Annotated[str, Named("body")]
-    body2: Annotated[str, Named("body")]
+    body1: Annotated[str, Named("link")]
+    body2: Annotated[str, Named("link")]
     frame1: Annotated[Array, POSE]
     frame2: Annotated[Array, POSE]
     pitch: Annotated[float, Measure(length=1)]
@@ -194,7 +194,7 @@ def resolve_joint(table: Checked[JointEntry], names: "ReferableNames") -> tuple[
     entry = table.entry
     if table.sound("bodies"):
         for i, name in enumerate(entry.bodies):
-            names.check(table, name, f"bodies[{i}]", "body")
+            names.check(table, name, f"bodies[{i}]", "link")
         if entry.bodies[0] == entry.bodies[1]:
             table.fault("same body", "bodies", f'"{entry.bodies[0]}" twice')
     if table.sound("heat"):

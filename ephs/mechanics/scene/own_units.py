@@ -16,7 +16,6 @@ from ephs.mechanics.scene.element import POSE, NumberForm
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
-from ephs.mechanics.scene.site import nodes_of_shells
 from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array
@@ -77,7 +76,7 @@ def in_own_units(problem: Problem) -> Problem:
         return problem
     small = once(scene, "own", lambda: rescaled(scene, 1.0 / units.length, 1.0 / units.mass, 1.0 / units.time))
     ports = {port: where for _, j in scene.all_joints() for port, where in _ports(j, units)}
-    pushable = [*dict(scene.all_bodies()), *nodes_of_shells(scene)]
+    pushable = [*dict(scene.all_bodies()), *(sheet.node(i) for _, sheet in scene.all_shells() for i in sheet.moving())]
     bodies = {wrench_port(name): np.array([units.length] * 3 + [1.0] * 3) for name in pushable}
     force = units.mass * units.length / units.time**2
     flows = {

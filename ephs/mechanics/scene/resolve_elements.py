@@ -18,7 +18,7 @@ from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, legible, lis
 from ephs.mechanics.scene.model import KINDS, Scene, elements_of, with_sections
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.schema_numbers import LARGEST
-from ephs.mechanics.scene.site import Site, built
+from ephs.mechanics.scene.site import Site, built, nodes_of_shells, shells_of
 from ephs.operad import PatternError
 from ephs.semantics.bundles.errors import SemanticsError
 
@@ -43,15 +43,17 @@ class ReferableNames:
         }
         inside["thermal"] |= warm
         known = {section: names.union(document.sections[section]) for section, names in inside.items()}
-        known["shells"] = set(document.sections["shells"])
-        return ReferableNames(known | {"beams": set(document.sections["beams"])}, unknown_parts)
+        own = {"shells": set(document.sections["shells"]), "beams": set(document.sections["beams"])}
+        return ReferableNames(known | own | {"meshes": known["shells"]}, unknown_parts)
 
     def check(self, table: Checked[Any], name: str, at: str, kind: str) -> None:
         """Append a fault where a reference of a kind at a key is unknown."""
         own = [*HOLDERS[kind], *(["beams"] if kind == "side" else [])]
         if kind == "carrier" and all(name in self.known[section] for section in own):
             table.fault("collision", at, f'"{name}", a body and a shell', other="a body")
-        there = any(name in self.known[section] for section in own)
+        sheet, _, number = name.rpartition(".")
+        node = kind == "body" and number.isdecimal() and sheet in self.known["meshes"]  # rules say whether it is there
+        there = node or any(name in self.known[section] for section in own)
         if there or name in OUTSIDE[kind] or name.split(".")[0] in self.unknown_parts:
             return
         known = set[str]().union(*(self.known[section] for section in own))
@@ -91,6 +93,8 @@ def with_contacts(scene: Scene, faults: list[Fault]) -> Scene:
     scene = with_sections(scene, {"shells": sheets})
     for each in (*sheets.values(), *scene.surfaces.values()):  # what carries contacts
         faults += _broken_at(scene, each)
+    for each in () if faults else elements_of(scene):
+        _check_nodes(scene, each, faults)
     if faults:
         return scene
     found = given or {each.name: each for each in meeting(scene)}
@@ -158,6 +162,21 @@ def _placed(scene: Scene, element: Element) -> Iterator[Fault]:
             if joint.dim != 1 or (kind == AXIS and joint.motion is not None):
                 table.fault(what, place, f"{name}, {joint.kind}")
     yield from table.faults or _broken_at(scene, element)
+
+
+def _check_nodes(scene: Scene, element: Element, faults: list[Fault]) -> None:
+    """Append a fault where it names a node that a shell does not have, or one that is welded to a body."""
+    table = Checked(element, f"{element.section}.{element.name}", faults)
+    for place, kind, name in element.references():
+        at, _, number = name.rpartition(".")
+        if kind != "body" or (sheet := shells_of(scene).get(at)) is None or name in nodes_of_shells(scene):
+            continue
+        count = len(sheet.mesh().points)
+        body = next((body for body, nodes in sheet.welds().items() if number in map(str, nodes)), None)
+        if body is None:
+            table.fault("unknown node", place, f'"{name}"', first=sheet.node(0), last=sheet.node(count - 1))
+        else:
+            table.fault("welded node", place, f'"{name}", welded to {body}', body=body)
 
 
 def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:

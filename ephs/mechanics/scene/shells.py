@@ -9,8 +9,9 @@ from pydantic import Field, PrivateAttr, TypeAdapter, WrapValidator, model_valid
 from ephs.mechanics.elements.shell.section import ShellSection
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.system import shell_system
+from ephs.mechanics.scene.bodies import Body
 from ephs.mechanics.scene.custom import Element, key
-from ephs.mechanics.scene.element import ENVIRONMENT, FREE_END, GROUND, POSE, TWIST
+from ephs.mechanics.scene.element import ENVIRONMENT, FREE_END, GROUND, POSE, TWIST, frozen
 from ephs.mechanics.scene.errors import TEXTS, shown
 from ephs.mechanics.scene.faces import Faces
 from ephs.mechanics.scene.layers import Layers, laminate, rescaled_layers
@@ -335,14 +336,25 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         welded = {node for nodes in self.welds().values() for node in nodes}
         return [i for i in range(len(self.mesh().points)) if i not in welded]
 
-    def pushed(self) -> list[int]:
-        """Numbers of the nodes that move, where a pressure acts."""
+    def moving(self) -> list[int]:
+        """Numbers of the nodes that are not welded to the ground, where forces may act."""
         still = self.welds().get(GROUND, [])
-        return [] if self.pressure is None else [i for i in range(len(self.mesh().points)) if i not in still]
+        return [i for i in range(len(self.mesh().points)) if i not in still]
+
+    def bodies(self) -> dict[str, Body]:
+        """The nodes that are welded to nothing, as bodies by their names."""
+        shell, (poses, twists) = self.shell(), self.start()
+        tensors = shell.tensors(spread=self.spread)
+        return {
+            (name := self.node(i)): Body(
+                name, float(shell.inertia[i, 3]), frozen(tensors[i]), frozen(poses[i]), frozen(twists[i])
+            )
+            for i in self.free()
+        }
 
     def node(self, number: int) -> str:
-        """Name of a node in pictures."""
-        return f"{self.name}-node{number}"
+        """Name of a node, as of a body."""
+        return f"{self.name}.{number}"
 
     def faces(self, site: Site) -> Faces:
         """Its elements; of a scene whose nodes are no bodies where these are at the start."""
@@ -381,8 +393,7 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
                 back = quaternion_to_matrix(off[:4]).T
                 twists[i, 3:] = back @ (speed + np.cross(spin, off[4:]))
                 twists[i, :3] = back @ spin if body in held and i in held[body] else twists[i, :3]
-        touching = any(surface.body == self.name for surface in site.scene.surfaces.values())
-        shared = sorted({*self.pushed(), *(self.free() if touching else ())})
+        shared = self.moving()
         made = shell_system(
             self.shell(), gravity=site.gravity, damping=self.damping, held=ground, carried=carried,
             pinned=[node for nodes in pinned.values() for node in nodes], fixed=fixed, shared=shared, heat=bool(warm),

@@ -24,6 +24,7 @@ from ephs.solve.posing.problem import Signal
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from ephs.mechanics.scene.bodies import Body
     from ephs.mechanics.scene.custom import Element
     from ephs.mechanics.scene.model import Scene
     from ephs.mechanics.scene.shells import ShellSheet
@@ -109,12 +110,15 @@ class Site:
         if body == GROUND:
             return IDENTITY_POSE
         self._level.moving.add(self.element.name)
-        return found if (found := nodes_of_shells(self.scene).get(body)) is not None else self.scene.body(body).pose
+        return self._body(body).pose
 
     def twist(self, body: str) -> Array:
-        """(6,) of a body at the start, in its frame; of the ground 0."""
+        """(6,) of a body, or a node of a shell, at the start, in its frame; of the ground 0."""
         self._level.moving.add(self.element.name)
-        return np.zeros(6) if body == GROUND else self.scene.body(body).twist
+        return np.zeros(6) if body == GROUND else self._body(body).twist
+
+    def _body(self, name: str) -> "Body":
+        return nodes_of_shells(self.scene).get(name) or self.scene.body(name)
 
     def rate(self, joint: str) -> Array:
         """(d,) u_r of a joint at the start; rad/s, m/s."""
@@ -147,7 +151,8 @@ class Site:
 
     def momentum(self, body: str) -> str:
         """The junction of the momentum of a body, or of a node of a shell; the ground has one, too."""
-        if body != GROUND and body not in nodes_of_shells(self.scene):
+        own = body.startswith(f"{self.element.name}.")  # nodes of a shell
+        if body != GROUND and not own and body not in nodes_of_shells(self.scene):
             self._known("body", "end", "side", name=body)
         return self._level.momentum(body)
 
@@ -258,11 +263,11 @@ def shells_of(scene: "Scene") -> "Mapping[str, ShellSheet]":
     return once(scene, "shells", lambda: dict(scene.all_shells()))
 
 
-def nodes_of_shells(scene: "Scene") -> "Mapping[str, Array]":
-    """Poses (7,) of all nodes of shells at the start, by their names in pictures; made once and kept with the scene."""
+def nodes_of_shells(scene: "Scene") -> "Mapping[str, Body]":
+    """Nodes of shells that are welded to nothing, as bodies by their names; made once and kept with the scene."""
 
-    def made() -> dict[str, Array]:
-        return {sheet.node(i): pose for sheet in shells_of(scene).values() for i, pose in enumerate(sheet.start()[0])}
+    def made() -> "dict[str, Body]":
+        return {name: node for sheet in shells_of(scene).values() for name, node in sheet.bodies().items()}
 
     return once(scene, "nodes of shells", made)
 

@@ -17,6 +17,7 @@ from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ELEMENTS, Body, Joint, Scene, mapped
 from ephs.mechanics.scene.resolve_elements import broken
+from ephs.mechanics.scene.site import nodes_of_shells
 from ephs.operad import Path as Name
 
 Sizes: TypeAlias = dict[str, tuple[Any, tuple[int, ...]]]
@@ -45,8 +46,10 @@ def check_scene(scene: Scene) -> None:
     beams = [beam for _, beam in scene.all_beams()]
     named += [("body", name) for beam in beams for name in beam.nodes]
     named += [("joint", name) for beam in beams for name in beam.joints]
+    nodes = nodes_of_shells(scene)
     for kind, name in named:
-        if name not in OUTSIDE[kind] and not any(name in there[section] for section in HOLDERS[kind]):
+        known = (kind == "body" and name in nodes) or any(name in there[section] for section in HOLDERS[kind])
+        if name not in OUTSIDE[kind] and not known:
             first = HOLDERS[kind][0]
             what = {"bodies": "body", "thermal": "thermal node"}.get(first, first.removesuffix("s"))
             raise ValueError(f"there is no {what} {legible(str(name))}")

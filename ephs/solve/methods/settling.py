@@ -126,7 +126,7 @@ class Settling:
     active
         Whether there are such storages; where none of their states may be moved, what they miss is left.
     mixed
-        (storages,) those of them with entropies.
+        (storages,) those of them with entropies; of environments, whose energy is linear, entropies miss nothing.
     noted
         What was moved in states that are kept.
     """
@@ -136,14 +136,16 @@ class Settling:
         counted = np.setdiff1d(np.flatnonzero(t.kind == STORING), booked)
         self._model, self._counted, self.noted = model, counted, Noted()
         self._free, weights = np.zeros(d.point_size), np.zeros(d.point_size)
+        mixed: list[int] = []
         for number in counted.tolist():
             slot = d.components[number]
+            environment = isinstance(slot.primitive, Storage) and slot.primitive.environment
             for state in slot.reads:
                 self._free[state.point] = float(state.quantity.kind != "entropy")
-                environment = isinstance(slot.primitive, Storage) and slot.primitive.environment
                 weights[state.point] = model.reference.intensive(state.quantity) if environment else 0.0
-        self.active = bool(counted.size)
-        self.mixed = counted[[bool(t.entropy[efforts_of(t, counted[k : k + 1])].any()) for k in range(counted.size)]]
+            if not environment and t.entropy[efforts_of(t, np.array([number]))].any():
+                mixed.append(number)
+        self.active, self.mixed = bool(counted.size), np.array(mixed, dtype=np.int64)
         self._rates, efforts = rates_of(t, self.mixed), efforts_of(t, self.mixed)
         self._efforts, self._intensive = int(t.counts[0]) + efforts, t.intensive[efforts]
         self._thermal, self._owners = t.entropy[efforts], np.repeat(np.arange(self.mixed.size), t.dims[self.mixed, 0])

@@ -102,6 +102,6 @@ def test_a_body_that_is_moved_strains_the_sheet_that_it_carries():
 
 def test_nodes_are_read_as_bodies():
     run = ran(hub())
-    assert run.body("skin-node11").velocity[-1] == pytest.approx(
-        run.linked.twists["skin-node11"][-1, 3:] @ run.body("skin-node11").rotation[-1].T, abs=1e-12
+    assert run.body("skin.11").velocity[-1] == pytest.approx(
+        run.linked.twists["skin.11"][-1, 3:] @ run.body("skin.11").rotation[-1].T, abs=1e-12
     )
