@@ -336,7 +336,9 @@ class Radau:
             parts[:] = np.abs(h * scheme.coefficients @ change[:, :rates]) / allowed
             moved = float(np.max(parts, initial=0.0))
             stalls, before = tries > 2 and moved > 0.3 * before, moved
-            if np.isfinite(moved) and (self.equations.linear or (stalls and self._rounded(state, h, stages, change))):
+            left = parts.max(axis=0, initial=0.0) > ENOUGH
+            rounded = stalls and not np.any(self._unrounded(state, h, stages, change) & left)
+            if np.isfinite(moved) and (self.equations.linear or rounded):
                 return 0.0  # one iteration solves what is linear, and rounding is no change
             return moved
 
@@ -347,8 +349,8 @@ class Radau:
         path = self.model.state_path(worst_entry(parts.max(axis=0)))
         raise SolveError(Outcome.DIVERGED, path, "its rate at the stages")
 
-    def _rounded(self, state: RadauState, h: float, stages: Array, change: Array) -> bool:
-        """Whether rounding, of the equations' terms and of the numbers' sums, alone changes the stages' rates so much.
+    def _unrounded(self, state: RadauState, h: float, stages: Array, change: Array) -> Array:
+        """(states,) where more than rounding, of the equations' terms and of the numbers' sums, changes rates so much.
 
         A factor of 10 covers what the signs of the terms may cancel here.
         """
@@ -358,7 +360,7 @@ class Radau:
         summed += abs(h) * np.abs(self.scheme.coefficients[-1]).sum() * largest[:rates]
         terms = abs(m.unknowns) @ largest + abs(m.states)[:, :rates] @ summed
         allowed = ROUNDING * np.abs(real(terms)[:rates])
-        return bool(np.all(np.abs(change[:, :rates]) <= allowed))
+        return np.any(np.abs(change[:, :rates]) > allowed, axis=0)
 
     def _error(self, state: RadauState, h: float, stages: Array, y: Array) -> float:
         """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
