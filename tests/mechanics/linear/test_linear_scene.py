@@ -171,9 +171,6 @@ def test_forces_wrenches_and_markers_push_as_the_motion_says():
         assert found.B[1, found.inputs.index(f"markers.tip[{i}]")] == pytest.approx(expected, abs=1e-12)
 
 
-# ---- closed forms ------------------------------------------------------------------------------------------------
-
-
 # ---- laws --------------------------------------------------------------------------------------------------------
 
 
