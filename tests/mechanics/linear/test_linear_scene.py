@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 import xarray
@@ -26,14 +25,6 @@ from tests.written import scene_of_text
 def extrapolated(function, h=1e-2):
     """The derivative at 0, by central differences extrapolated three times."""
     return slope(function, h, 3)
-
-
-@pytest.fixture(autouse=True)
-def without_a_log_file():
-    """Files of older versions make MuJoCo warn, into the working folder."""
-    mujoco.set_mju_user_warning(lambda text: None)
-    yield
-    mujoco.set_mju_user_warning(None)
 
 
 # ---- against differences and other engines -----------------------------------------------------------------------
