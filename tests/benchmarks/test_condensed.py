@@ -88,23 +88,6 @@ def test_rates_and_steps_of_chains_of_parts(family, h):
         assert distance(flat, x, method.step(method.init(x), h).z[0], found, h)[0] <= 1.0
 
 
-def test_what_has_no_pivot_inside_a_part_stays(monkeypatch):
-    """The multipliers of a joint between two ports are unknowns of the relation between them."""
-    system = FAMILIES["bodies and joints"](4)
-    parts, flat = models(system, at_rest(system))
-    sizes = []
-    solved = condensed._System.solved
-    monkeypatch.setattr(
-        condensed._System, "solved", lambda self, rows, columns: sizes.append(rows.size) or solved(self, rows, columns)
-    )
-    x = flat.descriptor.pack(system.state())
-    found = solved_by_parts(parts, x, 1e-2)
-    ends = 5 * 6  # efforts at the ends of the links, and the flow that holds the first
-    assert sizes and set(sizes) <= set(range(ends + 6, ends + 6 + 4 * 6 + 1))
-    method = Natural(flat)
-    assert distance(flat, x, method.step(method.init(x), 1e-2).z[0], found, 1e-2)[0] <= 1.0
-
-
 def linear_defect(system):
     """How far a linear solution by parts is from the dense one, as a multiple of what rounding allows."""
     model, _ = models(system, at_rest(system))

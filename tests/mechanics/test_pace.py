@@ -104,15 +104,3 @@ def test_a_crank_made_by_hand_has_the_limit_of_that_in_a_scene(told, seconds):
         expected = min(TURN, (TIMES * rtol) ** (1.0 / order)) / np.pi
         of_scene = longest_step(problem_of_scene(replace(scene, joints=joints)), order, rtol, (0.0, seconds))
         assert of_scene == longest_step(problem, order, rtol, (0.0, seconds)) == pytest.approx(expected, rel=1e-3)
-
-
-@pytest.mark.parametrize("method", ["rk87", "rk54", "auto"])
-def test_a_driven_crank_made_by_hand_takes_the_steps_of_the_scene(method):
-    law = ephs.HarmonicMotion(0.1, 50.0, 0.5 * np.pi)
-    scene, system, poses, _ = four_bar_by_hand()
-    joints = {**scene.joints, "main": replace(scene.joints["main"], motion=law, drive=np.zeros(1))}
-    how = {"method": method, "rtol": 1e-3, "atol": 1e-3}
-    file = ephs.simulate(replace(scene, joints=joints), 0.04, **how)
-    hand = ephs.simulate(system, 0.04, initial=poses, inputs={"motor": {"effort": law}}, **how)
-    assert file.stats["steps"] == hand.stats["steps"] and np.array_equal(file.t, hand.t)
-    assert file.stats["longest_step"] <= TURN / (0.1 * 2.0 * np.pi * 50.0) * 1.001

@@ -6,7 +6,6 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.build import scene_inputs
 from ephs.solve.running.control import RTOL
-from tests.mechanics.test_twins import PIN, SCENE, TWINS, load  # noqa: F401 - a fixture
 from tests.numerics import EPS, largest
 from tests.scenes import SCENES, of_all_scenes
 
@@ -46,14 +45,6 @@ def goes_on(scene, method):
     whole, half = (ephs.simulate(scene, until, **run) for until in (2 * STEP * STEPS, STEP * STEPS))
     there = scene.at(half, STEP * STEPS)
     return apart(whole, ephs.simulate(there, 2 * STEP * STEPS, t0=STEP * STEPS, **run))
-
-
-@pytest.mark.parametrize("name", TWINS)
-def test_runs_of_all_elements_go_on(name, load):  # noqa: F811 - the fixture
-    """By rk87: the first stage of a step of rk54 is the last one of the step before, before its correction."""
-    twin = TWINS[name](load)
-    scene = load((PIN if twin.pinned else "") + twin.text)
-    assert goes_on(scene, "rk87") <= CONDITION * ROUNDING
 
 
 @of_all_scenes

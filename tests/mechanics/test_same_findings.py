@@ -9,7 +9,7 @@ from ephs.mechanics.scene.rescaled import rescaled
 from tests.scenes import shipped
 from tests.written import scene_of_text
 
-NAMES = ("biped", "body", "cardan-shaft", "chain", "dzhanibekov", "four-bar", "heavy-top", "hot-brake", "slider-crank")
+NAMES = ("biped", "body", "chain", "four-bar", "heavy-top", "hot-brake")
 SETTINGS = (
     {"method": "natural", "step": 0.05},
     {"method": "rk54", "step": 0.02},

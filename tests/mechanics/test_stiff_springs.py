@@ -78,7 +78,7 @@ def test_a_spring_in_a_pin_acts_on_all_that_turns_about_it(stiffness):
 
 
 @pytest.mark.parametrize("by_hand", [False, True], ids=["scene", "system"])
-@pytest.mark.parametrize("stiffness", [1e17, 1e20, 1e30])
+@pytest.mark.parametrize("stiffness", [1e17, 1e30])
 @pytest.mark.parametrize(("method", "step"), [("natural", 0.01), ("natural4", 0.01), ("natural", None)])
 def test_steps_do_not_pass_over_an_oscillation_without_a_finding(by_hand, stiffness, method, step):
     """The rate is cos ω t with ω up to 1.7e15 rad/s; results have 1 or −1 at every instant, and keep the energy."""
@@ -94,11 +94,11 @@ def test_steps_do_not_pass_over_an_oscillation_without_a_finding(by_hand, stiffn
         assert "of joints.pin.pe, has" in str(failed.value)
 
 
-@pytest.mark.parametrize("stiffness", [1e13, 1e17, 1e30])
-@pytest.mark.parametrize(("method", "step"), [("natural", 0.01), ("natural4", 0.01)])
-def test_what_hardly_swings_is_at_rest(stiffness, method, step):
+@pytest.mark.parametrize("stiffness", [1e13, 1e30])
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+def test_what_hardly_swings_is_at_rest(stiffness, method):
     """The weight turns the pin by 4.9/k rad: the result is right to 1e-12 rad."""
-    sol = ephs.simulate(pendulum(stiffness), 1.0, method=method, step=step)
+    sol = ephs.simulate(pendulum(stiffness), 1.0, method=method, step=0.01)
     assert not sol.audit.findings
     assert largest(sol.joint("pin").coordinate) <= 2.0 * 9.81 * 0.5 / stiffness * (1.0 + 1e-6)
 

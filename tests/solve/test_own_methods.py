@@ -1,6 +1,6 @@
 """Methods of one's own: what a recording keeps, which order its coefficients have, what is refused."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -43,21 +43,6 @@ class Ralston(Method):
 
     def estimate(self, step, rates, end):
         return step.h * (rates[1] - rates[0]) / (2 * self.at)
-
-
-@dataclass(frozen=True)
-class Given(Method):
-    """A method by its coefficients: of drawn ones nothing else is known."""
-
-    a: tuple[tuple[float, ...], ...] = ()
-    b: tuple[float, ...] = (1.0,)
-    more: tuple[float, ...] = field(default=())
-
-    def stages(self, step):
-        rates = [step.rates()]
-        for row in self.a:
-            rates.append(step.rates(step.h * sum(w * k for w, k in zip(row, rates, strict=True))))
-        return step.h * sum(w * k for w, k in zip(self.b, rates, strict=True))
 
 
 def _rational(a, b):

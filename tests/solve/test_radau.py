@@ -261,7 +261,7 @@ def stopped(friction, *, store=None, **options):
 
 
 @pytest.mark.parametrize("step", [0.002, 0.05, None])
-@pytest.mark.parametrize("friction", [20.0, 1e4, 1e6, 1.3e6, 2.7e6, 1e7])
+@pytest.mark.parametrize("friction", [20.0, 1e4, 1.3e6, 1e7])
 def test_a_brake_put_together_by_hand_makes_heat_of_all_that_it_takes(friction, step):
     """Its heat is ½ (p⁰² − p¹²)/m to rounding of N steps, also within steps."""
     times = np.linspace(0.0, 1.0, 8)

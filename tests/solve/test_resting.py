@@ -40,7 +40,7 @@ METHODS = [("radau", {}), ("rk87", {}), ("natural4", {"step": 0.01}), ("natural"
 
 
 @pytest.mark.parametrize(("method", "steps"), METHODS)
-@pytest.mark.parametrize("power", [1.2, 1.5, 2.5, 3.3])
+@pytest.mark.parametrize("power", [1.2, 2.5])
 def test_springs_of_any_power_swing_from_where_their_derivatives_are_roots(method, steps, power):
     """½ p² + |q|ᵃ from q = 0: p = 0 after a quarter of a period, at |q|ᵃ = ½. A drag as |v|ᵇ v begins at rest, too."""
     quarter = 0.5 ** (1.0 / power) * beta(1.0 / power, 0.5) / power

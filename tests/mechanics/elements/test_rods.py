@@ -13,12 +13,11 @@ from ephs.mechanics.scene import build
 from ephs.semantics.spaces import SE3, SO3, pair
 from ephs.testing import check_primitive
 from tests.mechanics.elements.test_beam import flight_is_lawful
-from tests.mechanics.linear.test_beam_statics import PRINCETON, along, elastica, princeton_force
+from tests.mechanics.linear.test_beam_statics import HEAD, along
 from tests.methods import OF_SCENES
 from tests.numerics import largest
 from tests.written import scene_of_text
 
-HEAD = 'format = 1\nname = "rods"\n[world]\ngravity = [0.0, 0.0, {gravity}]\n'
 KIRCHHOFF = "{ GJ = 0.8, EI = [1.0, 2.0], rhoA = 1.0, rhoI = [2e-4, 1e-4, 1e-4] }"
 STRING = "{ rhoA = 0.3 }"
 
@@ -41,37 +40,6 @@ def assert_of_order_2(found, exact):
 
 
 # ---- rest -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("elements", [3, 8])
-@pytest.mark.parametrize("axis", [1, 2])
-def test_an_end_moment_rolls_a_rod_up_to_a_circle(elements, axis):
-    """About either axis of the section, the stiffer one too; the pieces are then a regular polygon."""
-    moment = [0.0, 0.0, 0.0]
-    moment[3 - axis] = 2.0 * np.pi * axis  # the world's z is the section's axis 3, its y axis 2
-    text = rod(along(1.0), elements) + load(elements, moment=moment)
-    text = text.replace("EI = [1.0, 2.0]", "EI = [2.0, 1.0]")
-    rest = ephs.equilibrium(scene_of_text(text))
-    assert largest(rest.model.body(f"rod.{elements}").pose[4:]) <= 1e-11
-
-
-def test_a_rod_is_the_elastica():
-    """A cantilever under a dead load across its end, 5 EI/L², by elliptic integrals."""
-    found = []
-    for elements in (6, 12, 24):
-        scene = scene_of_text(rod(along(1.0), elements) + load(elements, force=[0.0, 0.0, 5.0]))
-        found.append(ephs.equilibrium(scene).model.body(f"rod.{elements}").pose[6])
-    assert_of_order_2(found, elastica(5.0)[1])
-
-
-@pytest.mark.parametrize(("degrees", "y", "z"), [(30, 10.112, 79.39), (60, 6.605, 129.89)])
-def test_the_princeton_beam_goes_where_its_table_says(degrees, y, z):
-    """Bent about both axes and twisted, with stiffnesses that are 15 and 4 times apart."""
-    section = "{{ GJ = {GJ}, EI = [{EI2}, {EI3}], rhoA = 0.1, rhoI = [2e-6, 1e-6, 1e-6] }}".format(**PRINCETON)
-    force = princeton_force(8.896, degrees)
-    text = rod(along(0.508), 12, section=section) + load(12, force=force)
-    found = 1e3 * ephs.equilibrium(scene_of_text(text)).model.body("rod.12").pose[5:]
-    assert largest(found - [y, z]) <= 0.01 * max(y, z)
 
 
 def test_a_string_hangs_as_a_catenary():
@@ -98,18 +66,6 @@ def test_a_hanging_string_swings_at_the_zeros_of_bessel_functions():
         found.append(all_[[0, 2]])  # every one twice, in both planes
     for i, zero in enumerate(jn_zeros(0, 2)):
         assert_of_order_2([pair[i] for pair in found], 0.5 * zero * np.sqrt(9.81) / (2.0 * np.pi))
-
-
-@pytest.mark.parametrize(
-    ("ends", "first"), [('ends = ["ground"]', 1.8751040687), ("", 4.7300407449)], ids=["cantilever", "free-free"]
-)
-def test_rods_swing_at_the_frequencies_of_thin_beams(ends, first):
-    found = []
-    for elements in (8, 16, 32):
-        text = rod(along(1.0), elements, more=ends).replace("[2e-4, 1e-4, 1e-4]", "[2e-9, 1e-9, 1e-9]")
-        modes = ephs.linearize(scene_of_text(text)).modes
-        found.append(min(mode.frequency for mode in modes if mode.frequency > 1e-3))
-    assert_of_order_2(found, first**2 / (2.0 * np.pi))  # about the softer axis
 
 
 def test_a_rod_twists_by_its_closed_form():

@@ -12,32 +12,44 @@ import ephs
 from tests.numerics import jacobian, largest
 from tests.written import scene_of_text
 
-HEAD = 'format = 1\nname = "rods"\n[world]\ngravity = [0.0, 0.0, 0.0]\n'
+HEAD = 'format = 1\nname = "rods"\n[world]\ngravity = [0.0, 0.0, {gravity}]\n'
 ROD = """[beams.{name}]
 points = {points}
 elements = {elements}
 up = {up}
-section = {{ EA = {EA!r}, GA = [{GA!r}, {GA!r}], GJ = {GJ!r}, EI = [{EI2!r}, {EI3!r}], {inertia} }}
+section = {{ {soft}GJ = {GJ!r}, EI = [{EI2!r}, {EI3!r}], rhoA = 1.0, rhoI = {turning} }}
 ends = [{ends}]
-order = {order}
+{form}
+{more}
 """
-INERTIA = "rhoA = 1.0, rhoI = [2e-3, 1e-3, 1e-3]"
-SOFT = {"EA": 1e4, "GA": 1e4, "GJ": 500.0, "EI2": 500.0, "EI3": 500.0}
+KINDS = {
+    "order 2": ("order = 2", "EA = {EA!r}, GA = [{GA!r}, {GA!r}], "),
+    "order 4": ("order = 4", "EA = {EA!r}, GA = [{GA!r}, {GA!r}], "),
+    "kirchhoff": ('rod = "kirchhoff"', ""),
+}
+"""Beams of either order, and rods that neither stretch nor shear."""
+SOFT = {"EA": 1e4, "GA": 1e4, "GJ": 500.0, "EI2": 500.0, "EI3": 1000.0}
+THIN = {"EA": 1e6, "GA": 1e6, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
 
 
-def rod(points, elements, section, name="rod", up=(0.0, 0.0, 1.0), ends='"ground"', order=2):
+def rod(
+    points, elements, section, kind="order 2", name="rod", up=(0.0, 0.0, 1.0), ends='"ground"', more="",
+    turning=(2e-3, 1e-3, 1e-3),
+):  # fmt: skip
     points, up = [[float(x) for x in point] for point in points], [float(x) for x in up]
+    form, soft = KINDS[kind]
     return ROD.format(
-        name=name, points=points, inertia=INERTIA, elements=elements, up=up, ends=ends, order=order, **section
-    )
+        name=name, points=points, elements=elements, up=up, ends=ends, form=form, soft=soft.format(**section),
+        more=more, turning=list(turning), **section,
+    )  # fmt: skip
 
 
 def load(body, **given):
     return f'[loads.{body.replace(".", "_")}]\nbody = "{body}"\n' + "".join(f"{k} = {v}\n" for k, v in given.items())
 
 
-def scene_of(text):
-    return scene_of_text(HEAD + text)
+def scene_of(text, gravity=0.0):
+    return scene_of_text(HEAD.format(gravity=gravity) + text)
 
 
 def displaced(scene, body):
@@ -49,12 +61,18 @@ def along(length):
     return [(0.0, 0.0, 0.0), (length, 0.0, 0.0)]
 
 
-@pytest.mark.parametrize("elements", [3, 4, 8])
-@pytest.mark.parametrize(("follower", "order"), [("true", 2), ("false", 2), ("true", 4)])
-def test_an_end_moment_rolls_a_rod_up_to_a_circle(elements, follower, order):
-    moment = load(f"rod.{elements}", moment=[0.0, 2.0 * np.pi * 500.0, 0.0], follower=follower)
-    scene = scene_of(rod(along(1.0), elements, SOFT, order=order) + moment)
-    assert largest(ephs.equilibrium(scene).model.body(f"rod.{elements}").pose[4:]) <= 1e-12
+@pytest.mark.parametrize("axis", [1, 2])
+@pytest.mark.parametrize(
+    ("kind", "elements", "follower"),
+    [("order 2", 3, "true"), ("order 2", 8, "false"), ("order 4", 4, "true"), ("kirchhoff", 3, "false")],
+)
+def test_an_end_moment_rolls_a_rod_up_to_a_circle(kind, elements, follower, axis):
+    """About either axis of the section, the stiffer one too; rigid pieces are then a regular polygon."""
+    moment = [0.0, 0.0, 0.0]
+    moment[axis] = 2.0 * np.pi * SOFT[f"EI{axis + 1}"]
+    end = f"rod.{elements}"
+    text = rod(along(1.0), elements, SOFT, kind, up=(0.0, 1.0, 0.0)) + load(end, moment=moment, follower=follower)
+    assert largest(ephs.equilibrium(scene_of(text)).model.body(end).pose[4:]) <= 1e-11
 
 
 @pytest.mark.parametrize("order", [2, 4])
@@ -66,7 +84,7 @@ def test_a_bend_of_45_degrees_goes_to_its_limit_by_its_order(order):
     for elements in (4, 8, 16):
         angles = np.linspace(0.0, np.pi / 4.0, 5)
         points = [(100.0 * np.sin(a), 100.0 * (1.0 - np.cos(a)), 0.0) for a in angles]
-        text = rod(points, elements, section, order=order) + load(f"rod.{elements}", force=[0.0, 0.0, 600.0])
+        text = rod(points, elements, section, f"order {order}") + load(f"rod.{elements}", force=[0.0, 0.0, 600.0])
         found.append(displaced(scene_of(text), f"rod.{elements}"))
     one, two = found[1] - found[0], found[2] - found[1]
     assert np.linalg.norm(one) / np.linalg.norm(two) == pytest.approx(2.0**order, rel=0.05)
@@ -86,21 +104,19 @@ def princeton_section(h=12.3777e-3, w=3.2024e-3, young=71.7e9, nu=0.31):
 PRINCETON = princeton_section()
 
 
-def princeton_force(size, degrees):
-    beta = np.radians(degrees)
-    return [0.0, float(size * np.cos(beta)), float(size * np.sin(beta))]
-
-
 TABLE = [
-    (8.896, 30, 10.112, 79.39), (8.896, 60, 6.605, 129.89), (8.896, 90, 0.0, 146.25),
-    (13.345, 15, 16.458, 64.36), (13.345, 45, 15.186, 156.47), (13.345, 75, 6.249, 196.10),
+    ("order 2", 8.896, 30, 10.112, 79.39), ("kirchhoff", 8.896, 60, 6.605, 129.89), ("order 2", 8.896, 90, 0.0, 146.25),
+    ("order 2", 13.345, 15, 16.458, 64.36), ("kirchhoff", 13.345, 45, 15.186, 156.47),
+    ("order 2", 13.345, 75, 6.249, 196.10),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("force", "degrees", "y", "z"), TABLE)
-def test_the_princeton_beam_goes_where_its_table_says(force, degrees, y, z):
-    push = load("rod.12", force=princeton_force(force, degrees))
-    scene = scene_of(rod(along(0.508), 12, PRINCETON, up=(0.0, 1.0, 0.0)) + push)
+@pytest.mark.parametrize(("kind", "force", "degrees", "y", "z"), TABLE)
+def test_the_princeton_beam_goes_where_its_table_says(kind, force, degrees, y, z):
+    """Bent about both axes and twisted, with stiffnesses that are 15 and 4 times apart."""
+    beta = np.radians(degrees)
+    push = load("rod.12", force=[0.0, float(force * np.cos(beta)), float(force * np.sin(beta))])
+    scene = scene_of(rod(along(0.508), 12, PRINCETON, kind, up=(0.0, 1.0, 0.0)) + push)
     found = 1e3 * displaced(scene, "rod.12")[1:]
     assert largest(found - [y, z]) <= 0.01 * max(y, z)
 
@@ -121,12 +137,14 @@ def elastica(load_number):
     return np.array([x, y])
 
 
-@pytest.mark.parametrize(("number", "order"), [(1.0, 2), (10.0, 2), (10.0, 4)])
-def test_a_thin_rod_is_the_elastica(number, order):
-    section = {"EA": 1e8, "GA": 1e8, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
-    tips = []
+@pytest.mark.parametrize(
+    ("number", "kind"), [(1.0, "order 2"), (10.0, "order 2"), (10.0, "order 4"), (5.0, "kirchhoff")]
+)
+def test_a_thin_rod_is_the_elastica(number, kind):
+    order, tips = 4 if kind == "order 4" else 2, []
     for elements in (8, 16):
-        text = rod(along(1.0), elements, section, order=order) + load(f"rod.{elements}", force=[0.0, 0.0, number])
+        text = rod(along(1.0), elements, THIN | {"EA": 1e8, "GA": 1e8}, kind)
+        text += load(f"rod.{elements}", force=[0.0, 0.0, number])
         tips.append(ephs.equilibrium(scene_of(text)).model.body(f"rod.{elements}").pose[[4, 6]])
     limit = tips[1] + (tips[1] - tips[0]) / (2.0**order - 1.0)
     assert largest(limit - elastica(number)) <= largest(tips[1] - tips[0]) / 16.0
@@ -154,7 +172,6 @@ def hanging(number):
 
 WIRES = {
     "steel 2 mm": (2e-3, 210e9, 7850.0, 1.0),
-    "steel 1 mm": (1e-3, 210e9, 7850.0, 1.0),
     "steel 0.3 mm": (3e-4, 210e9, 7850.0, 1.0),
     "rubber": (5e-3, 5e6, 1100.0, 0.5),
 }
@@ -189,12 +206,12 @@ def frame(elements, force, rigid=1.0):
         "EI2": rigid * young * h**3 * t / 12.0, "EI3": young * t**3 * h / 12.0,
     }  # fmt: skip
     corner, end = (length, 0.0, 0.0), (length, -length, 0.0)
-    legs = rod([(0.0, 0.0, 0.0), corner], elements, section, order=4)
-    legs += rod([corner, end], elements, section, "arm", ends=f'"rod.{elements}"', order=4)
+    legs = rod([(0.0, 0.0, 0.0), corner], elements, section, "order 4")
+    legs += rod([corner, end], elements, section, "order 4", "arm", ends=f'"rod.{elements}"')
     return legs + load(f"arm.{elements}", force=[force, 0.0, 0.0])
 
 
-@pytest.mark.parametrize("end", [1.5, 3.0, -1.5, -2.0])
+@pytest.mark.parametrize("end", [1.5, 3.0, -1.5])
 def test_a_right_angle_frame_buckles_out_of_its_plane(end):
     """Whatever the last load: at 1.0868 N one way and 0.6802 N the other, if it is rigid in its plane."""
     (critical,) = ephs.equilibrium(scene_of(frame(4, end, rigid=100.0))).critical
@@ -218,8 +235,7 @@ def test_a_path_goes_through_limit_points():
     """A shallow arch with clamped feet snaps: the load falls, and rises again on the other side."""
     angles = np.linspace(-0.25, 0.25, 9)
     points = [(4.0 * np.sin(a), 0.0, 4.0 * np.cos(a)) for a in angles]
-    section = {"EA": 1e4, "GA": 1e4, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
-    text = rod(points, 8, section, up=(0.0, 1.0, 0.0), ends='"ground", "ground"')
+    text = rod(points, 8, THIN | {"EA": 1e4, "GA": 1e4}, up=(0.0, 1.0, 0.0), ends='"ground", "ground"')
     found = ephs.equilibrium(scene_of(text + load("rod.4", force=[0.0, 0.0, -600.0])))
     assert np.any(np.diff(found.shares) < 0.0) and found.shares[-1] == 1.0
     assert len(found.critical) >= 2 and found.model.body("rod.4").pose[6] < points[0][2]
@@ -228,28 +244,26 @@ def test_a_path_goes_through_limit_points():
 @pytest.mark.parametrize(
     ("ends", "first"), [('"ground"', 1.8751040687), ("", 4.7300407449)], ids=["cantilever", "free-free"]
 )
-@pytest.mark.parametrize("order", [2, 4])
-def test_rods_swing_at_the_frequencies_of_thin_beams(order, ends, first):
-    section = {"EA": 1e6, "GA": 1e6, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
-    found = []
+@pytest.mark.parametrize("kind", KINDS)
+def test_rods_swing_at_the_frequencies_of_thin_beams(kind, ends, first):
+    order, found = 4 if kind == "order 4" else 2, []
     for elements in (8, 16):
-        text = rod(along(1.0), elements, section, ends=ends, order=order)
-        linear = ephs.linearize(scene_of(text.replace("[2e-3, 1e-3, 1e-3]", "[2e-6, 1e-6, 1e-6]")))
+        text = rod(along(1.0), elements, THIN, kind, ends=ends, turning=(2e-6, 1e-6, 1e-6))
+        linear = ephs.linearize(scene_of(text))
         found.append(min(mode.frequency for mode in linear.modes if mode.frequency > 1e-3))
     exact = first**2 / (2.0 * np.pi)
     off = np.abs(np.array(found) / exact - 1.0)
     thick = 1e-6 * first**2  # of shear and rotary inertia, which thin beams have none of
     assert off[1] <= 2.0 * off[0] / 2.0**order + 4.0 * thick
-    assert found[1] + (found[1] - found[0]) / (2.0**order - 1.0) == pytest.approx(exact, rel=1e-3)
+    assert found[1] + (found[1] - found[0]) / (2.0**order - 1.0) == pytest.approx(exact, rel=max(1e-3, off[0] ** 2))
     assert (off[1] > 1e-3) == (order == 2)
 
 
 def test_tension_stiffens_and_modes_of_the_stressed_state_show_it():
     """A clamped rod under tension swings faster; under compression near Euler's load hardly at all."""
-    section = {"EA": 1e6, "GA": 1e6, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
     euler, slow = np.pi**2 / 4.0, []
     for force in (-0.97 * euler, 0.0, euler):
-        text = rod(along(1.0), 8, section) + load("rod.8", force=[float(force), 0.0, 0.0])
+        text = rod(along(1.0), 8, THIN) + load("rod.8", force=[float(force), 0.0, 0.0])
         scene = scene_of(text)
         rest = ephs.equilibrium(scene).model
         slow.append(min(mode.frequency for mode in ephs.linearize(rest).modes if mode.frequency > 1e-6))

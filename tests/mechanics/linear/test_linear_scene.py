@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 import xarray
@@ -26,14 +25,6 @@ from tests.written import scene_of_text
 def extrapolated(function, h=1e-2):
     """The derivative at 0, by central differences extrapolated three times."""
     return slope(function, h, 3)
-
-
-@pytest.fixture(autouse=True)
-def without_a_log_file():
-    """Files of older versions make MuJoCo warn, into the working folder."""
-    mujoco.set_mju_user_warning(lambda text: None)
-    yield
-    mujoco.set_mju_user_warning(None)
 
 
 # ---- against differences and other engines -----------------------------------------------------------------------
@@ -169,9 +160,6 @@ def test_forces_wrenches_and_markers_push_as_the_motion_says():
         own = turn.T @ np.eye(3)[i]
         expected = wrench @ np.concatenate([np.cross([0.1, 0.2, 0.0], own), own])
         assert found.B[1, found.inputs.index(f"markers.tip[{i}]")] == pytest.approx(expected, abs=1e-12)
-
-
-# ---- closed forms ------------------------------------------------------------------------------------------------
 
 
 # ---- laws --------------------------------------------------------------------------------------------------------

@@ -180,7 +180,7 @@ def test_double_real_eigenvalues_are_not_oscillations():
 
 
 @pytest.mark.parametrize("place", [0.0, 0.75])
-@pytest.mark.parametrize("power", [1.0, 1.3, 1.5, 1.9, 2.25, 2.6, 3.0])
+@pytest.mark.parametrize("power", [1.0, 1.3, 1.9, 2.25, 3.0])
 def test_a_state_at_a_kink_has_no_linear_system(power, place):
     """|q − c|ᵖ at c: its effort jumps for p = 1, its stiffness is infinite for p < 2, and 0 beyond."""
     spring = ephs.storage({"q": quantity.displacement}, lambda q: abs(q - place) ** power)
@@ -215,8 +215,8 @@ def test_a_constraint_that_cannot_be_recorded_is_differenced_over_its_own_length
     assert (largest(linear(float) - exact) <= 1e-6 * largest(exact)) == (size > 1e-6)
 
 
-@pytest.mark.parametrize("beside", [0.0, 1e-9, 1e-3, 0.1, 1.0, 5.0, -1.0, 100.0])
-@pytest.mark.parametrize("entropy", [0.0, 1e-3, 0.05, -0.05])
+@pytest.mark.parametrize("beside", [0.0, 1e-9, 0.1, -1.0, 100.0])
+@pytest.mark.parametrize("entropy", [0.0, -0.05])
 def test_a_temperature_near_that_of_the_environment_is_no_kink(beside, entropy):
     """What rounds is the temperature, not the effort: with ṡ₁ = h (θ₂ − θ₁)/θ₁, ∂ṡ₁/∂s₁ = −h θ₂/(c θ₁)."""
     c, h, other = 12.9, 0.3, 300.0

@@ -55,26 +55,6 @@ def test_a_four_bar_made_by_hand_moves_as_that_of_a_file(method):
     assert not np.array_equal(control["bars.crank.pe.q"][-1], other["bars.crank.pe.q"][-1])
 
 
-@pytest.mark.parametrize("method", ["rk87", "natural"])
-def test_bodies_and_joints_of_a_system_are_read_by_the_paths_of_their_boxes(method):
-    scene, system, poses, inputs = four_bar()
-    step = {"step": 0.01, "audit": "off"}
-    one = ephs.simulate(scene, 0.1, method=method, **step)
-    other = ephs.simulate(system, 0.1, method=method, initial=poses, inputs=inputs, **step)
-    for name in scene.bodies:
-        first, second = one.body(name), other.body(f"bars.{name}")
-        assert np.array_equal(first.position, second.position)
-        assert largest(first.twist - second.twist) <= 1e-10 * (1.0 + largest(first.twist))
-    for name in scene.joints:
-        first, second = one.joint(name), other.joint(name)
-        assert np.array_equal(first.coordinate, second.coordinate)
-        assert largest(first.rate - second.rate) <= 1e-10 * (1.0 + largest(first.rate))
-        assert np.array_equal(np.isnan(first.wrench), np.isnan(second.wrench))
-        assert np.nanmax(np.abs(first.wrench - second.wrench)) <= 1e-9 * (1.0 + np.nanmax(np.abs(first.wrench)))
-    with pytest.raises(KeyError, match=r"did you mean .bars\.crank"):
-        other.body("bars.cank")
-
-
 def test_what_joint_coordinates_have_no_place_for_is_refused_by_name():
     pattern = Pattern.from_text(
         "p: body_momentum; q: displacement; x: momentum; body(p); rope(p, x); spring(q); pkc(q, p=x)"

@@ -80,7 +80,7 @@ def hot_brake(sol):
 
 
 @pytest.mark.parametrize("inputs", [None, {"joints.axle": lambda t: 0.0 * t}], ids=["compiled", "step by step"])
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-9])
 @pytest.mark.parametrize("method", ["rk54", "rk87", "radau"])
 def test_each_component_makes_its_own_to_the_tolerance(method, rtol, inputs):
     sol = ephs.simulate(shipped("hot-brake"), UNTIL, method=method, rtol=rtol, inputs=inputs)

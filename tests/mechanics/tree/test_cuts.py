@@ -25,7 +25,7 @@ JOINTS = {
     "spherical": (codes.SO3, 4, np.eye(6)[:, :3]),
 }
 KINDS = kinds_of((code, size, basis.shape[1]) for code, size, basis in JOINTS.values())
-RUNS = {"compiled": loop_program(KINDS).compiled(), "plain": loop_program(KINDS).plain()}
+RUN = loop_program(KINDS).compiled()
 
 
 def frame(rng):
@@ -76,9 +76,9 @@ class Loop:
         pose = np.array(se3.exp(PLAIN, list(basis @ self.element)), dtype=float)
         return np.array(so3.matrix(pose[:4]), dtype=float), pose[4:]
 
-    def found(self, run):
-        run["rows"](self.cut, self.numbers, self.places, self.motions, self.end, self.value, self.covector)
-        run["poses"](self.cut, self.numbers, self.places, self.motions)
+    def found(self):
+        RUN["rows"](self.cut, self.numbers, self.places, self.motions, self.end, self.value, self.covector)
+        RUN["poses"](self.cut, self.numbers, self.places, self.motions)
         return self
 
     def moved(self, h):
@@ -113,80 +113,75 @@ def inverse(frame):
 
 drawn = given(name=st.sampled_from(sorted(JOINTS)), seed=seeds)
 some = settings(max_examples=25)
-both = pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)
 STEP = 1e-4
 """Differences are of order two: their error is STEP² times third derivatives, and rounding over STEP."""
 CLOSE = 1e3 * STEP**2
 
 
-@both
 @drawn
 @some
-def test_rows_make_the_power_of_the_forbidden_twists(run, name, seed):
-    loop = Loop(name, seed).found(run)
+def test_rows_make_the_power_of_the_forbidden_twists(name, seed):
+    loop = Loop(name, seed).found()
     twist = loop.motions[0, 19:25]
     for a, normal in enumerate(loop.normal):
         power = loop.covector[2 * a] @ loop.places[0, 12:18] + loop.covector[2 * a + 1] @ loop.places[1, 12:18]
         assert power == pytest.approx(normal @ twist, abs=1e-13 * largest(loop.covector) * 10.0)
 
 
-@both
 @drawn
 @some
-def test_what_is_open_changes_by_the_forbidden_twists_and_these_by_the_targets(run, name, seed):
+def test_what_is_open_changes_by_the_forbidden_twists_and_these_by_the_targets(name, seed):
     loop = Loop(name, seed)
     worst, gaps, rates = np.zeros(1), [], []
     for h in (-STEP, STEP):
-        other = loop.moved(h).found(run)
-        run["fit"](other.cut, other.numbers, other.motions, other.element)
-        run["gaps"](other.cut, other.numbers, other.motions, other.element, other.value, worst)
+        other = loop.moved(h).found()
+        RUN["fit"](other.cut, other.numbers, other.motions, other.element)
+        RUN["gaps"](other.cut, other.numbers, other.motions, other.element, other.value, worst)
         gaps.append(-other.value[:, 0])
-        run["relative_rates"](other.cut, other.numbers, other.motions, other.value)
+        RUN["relative_rates"](other.cut, other.numbers, other.motions, other.value)
         rates.append(-other.value[:, 0])
-    here = loop.found(run)
+    here = loop.found()
     size = 1.0 + largest(here.places) ** 3
     assert largest((rates[1] - rates[0]) / (2.0 * STEP) + here.value[:, 0], initial=0.0) <= CLOSE * size
-    run["relative_rates"](here.cut, here.numbers, here.motions, here.value)
+    RUN["relative_rates"](here.cut, here.numbers, here.motions, here.value)
     # What fits to the bodies is along the joint's own freedoms, of whose groups these rows are the complement.
     found = (gaps[1] - gaps[0]) / (2.0 * STEP)
     assert largest(found + here.value[:, 0], initial=0.0) <= CLOSE * size
 
 
-@both
 @drawn
 @some
-def test_a_closed_joint_is_fitted_to_its_element(run, name, seed):
-    loop = Loop(name, seed).found(run)
+def test_a_closed_joint_is_fitted_to_its_element(name, seed):
+    loop = Loop(name, seed).found()
     wanted, worst = loop.element.copy(), np.zeros(1)
     loop.element[:] = np.array([1.0, 0.0, 0.0, 0.0]) if JOINTS[name][0] == codes.SO3 else 0.9 * wanted
-    run["fit"](loop.cut, loop.numbers, loop.motions, loop.element)
-    run["gaps"](loop.cut, loop.numbers, loop.motions, loop.element, loop.value, worst)
+    RUN["fit"](loop.cut, loop.numbers, loop.motions, loop.element)
+    RUN["gaps"](loop.cut, loop.numbers, loop.motions, loop.element, loop.value, worst)
     assert worst[0] <= 1e-13
     sign = np.sign(wanted @ loop.element) if JOINTS[name][0] == codes.SO3 else 1.0
     assert largest(sign * loop.element - wanted, initial=0.0) <= 1e-9
-    wide = Loop(name, seed, opened=0.1).found(run)
-    run["gaps"](wide.cut, wide.numbers, wide.motions, wide.element, wide.value, worst)
+    wide = Loop(name, seed, opened=0.1).found()
+    RUN["gaps"](wide.cut, wide.numbers, wide.motions, wide.element, wide.value, worst)
     assert worst[0] > 1e-6
 
 
-@both
 @drawn
 @some
-def test_elements_move_as_their_velocities_say(run, name, seed):
-    loop = Loop(name, seed).found(run)
+def test_elements_move_as_their_velocities_say(name, seed):
+    loop = Loop(name, seed).found()
     dim = JOINTS[name][2].shape[1]
     v = 0.3 * np.random.default_rng(seed).standard_normal(dim)
     out, at = np.zeros(dim), np.zeros(loop.element.size)
-    run["velocities"](loop.chart, loop.cut, loop.numbers, loop.motions, v, np.zeros(0), out)
-    run["advance"](loop.chart, loop.element, v, at)
+    RUN["velocities"](loop.chart, loop.cut, loop.numbers, loop.motions, v, np.zeros(0), out)
+    RUN["advance"](loop.chart, loop.element, v, at)
     # along v + h v̇ the element moves by h r on its right, r = B⁺ u
     rates = (np.linalg.pinv(JOINTS[name][2]) if dim else np.zeros((0, 6))) @ loop.motions[0, 19:25]
     ends = []
     for h in (-STEP, STEP):
         ends.append(np.zeros(at.size))
-        run["advance"](loop.chart, loop.element, v + h * out, ends[-1])
+        RUN["advance"](loop.chart, loop.element, v + h * out, ends[-1])
         direct = at.copy()
-        run["move"](loop.chart, h * rates, direct)
+        RUN["move"](loop.chart, h * rates, direct)
         ends[-1] -= direct
     assert largest((ends[1] - ends[0]) / (2.0 * STEP), initial=0.0) <= CLOSE * (1.0 + largest(rates, initial=0.0) ** 3)
 

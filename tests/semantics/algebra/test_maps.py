@@ -84,7 +84,6 @@ def test_the_middle_of_intervals_does_not_commute():
 
 
 PORT = Directory({"x": PortType(Q.displacement)})
-X = frozenset((Path.parse("x"),))
 DECAY = Sharer.of(PORT, {"x": "x"}, lambda v: {"x": (1 - v["x"][0],)})
 LOSS = Sharer.of(PORT, {"x": "x"}, lambda v: {"x": (-v["x"][0] * v["x"][0],)})
 

@@ -16,11 +16,6 @@ from tests.staged import run_both
 GROUPS = {codes.VECTOR: vector_space("real", 3), codes.SO3: SO3, codes.SE2: SE2, codes.SE3: SE3, codes.SO3xR3: SO3xR3}
 
 
-def framed(function):
-    """A function of a frame (R, p), of a pose."""
-    return lambda on, pose, u: function(so3.matrix(pose[:4]), pose[4:], u)
-
-
 def alone(function):
     """A function of numbers that needs no evaluator."""
     return lambda on, *arguments: function(*arguments)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ephs import Pattern
@@ -104,24 +104,6 @@ def test_what_changes_later_changes_nothing(p, s):
     reference = Reference(1.0, 0.0)
     flow = part.flow({}, np.array([p, s - 1.0]), reference)
     assert np.allclose(flow, [2.0 * p, -2.0 * p * p / s], rtol=1e-13, atol=1e-13 * (abs(p) + p * p))
-
-
-@settings(max_examples=30)
-@example(middle=449.9999999999999, width=1e-6, asks=True)  # 450 lies within it
-@given(st.floats(150.0, 900.0), st.floats(1e-6, 3.0), st.booleans())
-def test_friction_that_is_negative_in_a_drawn_window_is_refused(middle, width, asks):
-    """Whether it hides from its record or cannot be recorded; without the window it passes."""
-
-    def part(value):
-        def d(p, s):
-            inside = (np.isscalar(s) if asks else True) and abs((s if asks else float(s)) - middle) < width
-            return value if inside else 1.0
-
-        return drag(d)
-
-    with pytest.raises(StructureError) as caught:
-        part(-1.0)()
-    assert abs(caught.value.witness.efforts["s"] - middle) < width
 
 
 @pytest.mark.parametrize(

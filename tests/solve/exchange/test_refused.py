@@ -6,7 +6,6 @@ import ephs
 from tests.solve.exchange.units import changed
 
 PORT = {"effort": "force", "flow": "speed"}
-SECOND = '<Unit name="mm/s"><BaseUnit m="1" s="-1" factor="0.001"/></Unit>'
 
 
 def exchange(*names, file, period=0.01, wires=None, initial=None, **options):
