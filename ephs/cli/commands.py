@@ -114,7 +114,7 @@ def equations(
     scene: str,
     /,
     *,
-    form: Literal["relation", "descriptor", "reduced"] = "reduced",
+    form: Literal["paper", "folded", "relation", "descriptor", "reduced"] = "reduced",
     latex: bool = False,
     loading: LoadOptions = AS_GIVEN,
 ) -> int:
@@ -125,8 +125,9 @@ def equations(
     scene
         Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
     form
-        relation: equations of each junction and component; descriptor: effort functions of storages, balances and
-        constraints; reduced: interface variables eliminated.
+        paper, or relation: equations of each junction and component; folded: the same, without transformers and
+        junctions that store nothing; descriptor: effort functions of storages, balances and constraints; reduced:
+        interface variables eliminated.
     latex
         Print a LaTeX align environment.
     """
@@ -135,7 +136,12 @@ def equations(
     model = load_model(scene, loading)
     with addressed(scene):
         system = model.system() if isinstance(model, ephs.Scene) else model
-        found = system.equations(form)
+        if form == "folded":
+            from ephs.mechanics.rewrite.folding import FOLD
+            from ephs.mechanics.rewrite.rewrite import rewrite
+
+            system = rewrite(system, [FOLD]).system
+        found = system.equations("relation" if form in ("paper", "folded") else form)
     print(found.latex() if latex else found)
     return 0
 

@@ -244,7 +244,9 @@ def _started(
         for name in inputs:
             if name not in known:
                 raise ExportError("input", found=name, expected=", ".join(known))
-        problem = problem_of_scene(model, None, dict.fromkeys(inputs, 0.0))
+        sizes = {f"joints.{name}": joint.dim for name, joint in model.joints.items()}
+        zeros = {name: np.zeros(sizes[name]) if sizes.get(name, 1) > 1 else 0.0 for name in inputs}
+        problem = problem_of_scene(model, None, zeros)
     else:
         problem = problem_of_system(model)
     if (hard := problem.descriptor.strikes) is not None:
@@ -307,23 +309,25 @@ def _inputs(eq: ReducedEquations, scene: Scene | System, names: Sequence[str]) -
     t, out = eq.reduced.tables, list[ImageNumber]()
     actuators = _actuators(scene) if isinstance(scene, Scene) else {}
 
-    def driven(path: str) -> tuple[int, int]:
-        edge = next(i for i, edge in enumerate(eq.reduced.edges) if str(edge.path) == path)
-        return int(t.r_at[edge]), int(t.dim[edge])
+    def driven(path: str) -> list[int]:
+        edges = {str(edge.path): i for i, edge in enumerate(eq.reduced.edges)}
+        # a universal joint is two joints, below its name
+        found = [edges[name] for name in sorted(edges) if name == path or name.startswith(f"{path}.")]
+        return [int(t.r_at[i]) + k for i in found for k in range(t.dim[i])]
 
     for name in names:
         if name in actuators:
             out.append(_control(eq, name, actuators[name], driven))
             continue
-        first, size = driven(name)
-        for k in range(size):
-            whole = name if size == 1 else f"{name}.{k}"
-            share = Share(supplied=False, place=first + k, ratio=1.0)
-            out.append(ImageNumber(whole, "", first + k, float(eq.drive[first + k]), (share,)))
+        places = driven(name)
+        for k, place in enumerate(places):
+            whole = name if len(places) == 1 else f"{name}.{k}"
+            share = Share(supplied=False, place=place, ratio=1.0)
+            out.append(ImageNumber(whole, "", place, float(eq.drive[place]), (share,)))
     return out
 
 
-def _control(eq: ReducedEquations, name: str, of: Actuator, driven: Callable[[str], tuple[int, int]]) -> ImageNumber:
+def _control(eq: ReducedEquations, name: str, of: Actuator, driven: Callable[[str], list[int]]) -> ImageNumber:
     """The control of an actuator, with its forces on joints, or on the length of its tendon."""
     shares: list[Share] = []
     if of.tendon is None:

@@ -221,6 +221,8 @@ class Quantities:
     direct_momentum: Quantity = Quantity("momentum", Space("so(3)xR3*", 6, 6), -1)
 
     def __getattr__(self, name: str) -> Any:
+        if name == Quantity.__name__:  # makes other ones; it is no quantity, and so no name among them
+            return Quantity
         raise AttributeError(f"there is no quantity {name!r}{nearest_of(name, quantity_names())}")
 
     def species(self, name: str, /, **elements: float) -> Quantity:

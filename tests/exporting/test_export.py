@@ -52,7 +52,7 @@ def wanted(solution, name):
 def advanced(model, until, **given):
     """The exported model after a time, under inputs where some are given."""
     run = Run(exported(image_of(model, inputs=list(given), until=until), "made"))
-    run.call("inputs", None, np.array(list(given.values())))
+    run.call("inputs", None, np.hstack([[], *given.values()]))
     assert run.call("advance", ctypes.c_int64, until) == 0
     return run
 
@@ -172,6 +172,25 @@ def test_forces_from_outside_are_inputs():
     found = run.outputs()["joints.bearing.coordinate"]
     assert found == pytest.approx(pushed.joint("bearing").coordinate[-1], rel=1e-12)
     assert abs(found - free.joint("bearing").coordinate[-1]) > 1e-2
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "forces"),
+    [
+        ("heavy-top", "tip", [0.1, -0.2, 0.3]), ("universal", "cross", [0.3, -0.2]),
+        ("slider-crank", "big-end", [0.1, 0.2, -0.3]), ("four-bar", "knee", 0.4),
+    ],
+)  # fmt: skip
+def test_a_joint_of_any_number_of_freedoms_is_an_input(name, joint, forces):
+    """Cut joints, too; a universal one is two joints with a frame between them."""
+    model, given = shipped(name), {f"joints.{joint}": forces}
+    run = advanced(model, 0.1, **given)
+    moved = ephs.simulate(model, 0.1, method="rk87", inputs={key: np.array(f) for key, f in given.items()})
+    free = ephs.simulate(model, 0.1, method="rk87", save_at=[0.1])
+    outputs = {key: x for key, x in run.outputs().items() if key.startswith("bodies.")}
+    assert_named(outputs, moved, 1e-6)
+    with pytest.raises(AssertionError):
+        assert_named(outputs, free, 1e-5)
 
 
 def test_many_short_advances_stay_within_the_tolerance():

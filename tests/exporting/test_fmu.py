@@ -85,6 +85,43 @@ def test_a_kept_state_goes_on_to_the_same_bits(slave):
         unit.freeFMUState(state)
 
 
+@pytest.mark.parametrize("begun", [False, True])
+def test_outputs_before_the_start_are_those_of_the_parameters_that_are_set(slave, begun):
+    unit, references = slave
+    mass, energy = [references["bodies.rod.mass"]], [references["energy"]]
+    if begun:
+        unit.enterInitializationMode(startTime=0.0)
+    first = unit.getFloat64(energy)
+    unit.setFloat64(mass, [0.4])
+    there = unit.getFloat64(energy)
+    if not begun:
+        unit.enterInitializationMode(startTime=0.0)
+    unit.exitInitializationMode()
+    assert there == unit.getFloat64(energy) != first
+
+
+def test_parameters_are_fixed_after_the_start(slave):
+    unit, references = slave
+    unit.enterInitializationMode(startTime=0.0)
+    unit.exitInitializationMode()
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        unit.setFloat64([references["bodies.rod.mass"]], [0.4])
+    unit.reset()
+    unit.setFloat64([references["bodies.rod.mass"]], [0.4])
+
+
+@pytest.mark.parametrize(("point", "length"), [(0.1, -0.05), (0.3, 0.1), (0.0, 0.2), (np.nan, 0.1), (0.1, np.nan)])
+def test_steps_go_on_from_the_time_reached(slave, point, length):
+    unit, references = slave
+    unit.enterInitializationMode(startTime=0.0)
+    unit.exitInitializationMode()
+    unit.doStep(0.0, 0.1)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        unit.doStep(point, length)
+    unit.doStep(0.1 * (1.0 + 1e-14), 0.1)  # masters add up their steps
+    assert unit.getFloat64([references["time"]])[0] == pytest.approx(0.2, rel=1e-13)
+
+
 def test_outputs_cannot_be_set(slave):
     unit, references = slave
     with pytest.raises(fmpy.fmi1.FMICallException):

@@ -98,6 +98,13 @@ def test_a_wrong_quantity_is_refused(make, words):
     assert all(word in str(caught.value) for word in words)
 
 
+def test_other_quantities_are_made_beside_those_of_the_package():
+    assert quantity.Quantity is Quantity
+    assert "Quantity" not in table.quantity_names()
+    with pytest.raises(AttributeError, match="there is no quantity 'Quantities'"):
+        _ = quantity.Quantities
+
+
 def test_a_further_kind_of_pair_has_its_quantities(monkeypatch):
     monkeypatch.setattr(table, "_PAIRS", dict(table._PAIRS))
     with pytest.raises(PatternError, match="expected one of"):

@@ -222,6 +222,8 @@ def test_what_does_not_compose_is_refused_by_name():
         relation.compose(
             top, {Path.of("s"): as_relation(SPRING), Path.of("o"): OPEN(r=READER, **COIL).relation(Reference(300.0))}
         )
+    by_text, by_path = (relation.compose(top, {of("s"): SPRING, of("o"): relation}) for of in (str, Path.of))
+    assert by_text == by_path
     with pytest.raises(TypeError, match="s: a filling is a System, a primitive or a Relation, found float"):
         relation.compose(top, {Path.of("s"): 1.0, Path.of("o"): relation})
 
@@ -250,7 +252,7 @@ FRICTION = Pattern.from_text("p: momentum, exposed; s: entropy, exposed; mf(p, s
 def test_efforts_are_named_by_text_as_by_path():
     """The matrix of friction depends on the velocity at which it is taken."""
     e = np.array([2.0, 100.0])
-    named, pathed = FRICTION.at(efforts={"mf": e}), FRICTION.at(efforts={Path.of("mf"): e})
+    named, pathed = FRICTION.at(None, None, {"mf": e}), FRICTION.at(efforts={Path.of("mf"): e})
     assert named.distance(pathed) == 0.0
     assert named.distance(FRICTION.at()) > 0.1
 

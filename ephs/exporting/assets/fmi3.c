@@ -29,7 +29,7 @@ typedef void (*Log)(void *environment, Status status, const char *category, cons
 
 typedef struct {
   double origin, time;
-  bool begun, read;
+  bool running, begun, read;
   double in[INPUTS + 1], given[PARAMETERS + 1], out[OUTPUTS + 1];
   double memory[BYTES / 8 + 1];
 } State;
@@ -95,6 +95,7 @@ EXPORT Status fmi3EnterInitializationMode(
 
 EXPORT Status fmi3ExitInitializationMode(void *instance) {
   begin(instance);
+  ((Unit *)instance)->state.running = true;
   return OK;
 }
 
@@ -112,7 +113,12 @@ EXPORT Status fmi3DoStep(
   State *s = &unit->state;
   *event = *terminate = *early = false;
   *last = s->time;
-  if (!s->begun) return fail(unit, "fmi3DoStep before initialization", 0);
+  if (!s->running) return fail(unit, "fmi3DoStep before initialization", 0);
+  if (!(length >= 0.0)) return fail(unit, "fmi3DoStep backwards", 0);
+  /* masters add up their steps: times agree to rounding */
+  double apart = point - s->time, scale = (point < 0.0 ? -point : point) + length;
+  if (!(apart <= 1e-9 * scale && -apart <= 1e-9 * scale))
+    return fail(unit, "fmi3DoStep from a point that is not the time reached", 0);
   if (INPUTS) CALL(inputs)(s->memory, s->in);
   int64_t status = CALL(advance)(s->memory, point + length - s->origin);
   if (status) return fail(unit, "no step", status);
@@ -147,8 +153,11 @@ EXPORT Status fmi3SetFloat64(void *instance, const uint32_t *references, size_t 
   for (size_t k = 0; k < count; k++) {
     uint32_t place = references[k];
     if (place >= 1 && place <= INPUTS) unit->state.in[place - 1] = values[k];
-    else if (place > INPUTS && place <= INPUTS + PARAMETERS) unit->state.given[place - 1 - INPUTS] = values[k];
-    else return fail(unit, "no input or parameter has this value reference", place);
+    else if (place > INPUTS && place <= INPUTS + PARAMETERS) {
+      if (unit->state.running) return fail(unit, "parameters are fixed after initialization", place);
+      unit->state.given[place - 1 - INPUTS] = values[k];
+      unit->state.begun = unit->state.read = false; /* outputs are those of the changed model */
+    } else return fail(unit, "no input or parameter has this value reference", place);
   }
   return OK;
 }

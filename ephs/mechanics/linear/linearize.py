@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
     from ephs.mechanics.dynamics import State
     from ephs.mechanics.linear.equilibrium import Equilibrium
+    from ephs.operad import Path
+    from ephs.semantics.bundles.bundle import Array
+    from ephs.solve.posing.problem import Problem
 
 
 @in_one_thread
@@ -95,8 +98,8 @@ def linearize(
     assert isinstance(at, State)
     from ephs.mechanics.linear.system import linear_system
 
-    system = mechanism.problem.system
-    return linear_system(system, mechanism.states(at), _driven(model), outputs, _reference(model), model.name)
+    problem, states = mechanism.problem, mechanism.states(at)
+    return linear_system(problem.system, states, _driven(problem, states), outputs, _reference(model), model.name)
 
 
 def _of_system(
@@ -124,12 +127,20 @@ def _of_system(
     return linear_system(system, given, inputs, outputs, reference)
 
 
-def _driven(scene: Scene) -> dict[str, Any]:
-    """Values that a scene prescribes at the outer ports of its system."""
-    from ephs.mechanics.scene.build import scene_inputs
+def _driven(problem: "Problem", states: "Mapping[Path, Array]") -> dict[str, Any]:
+    """Values that a scene prescribes at the outer ports of its system, loads among them.
 
+    Raises
+    ------
+    OptionError
+        A load turns beside its body: what it adds to the stiffness is in joint coordinates alone.
+    """
+    for path, given in problem.signals.items():
+        if not (given.constant or given.timed):
+            raise OptionError("form", "paper", f"reduced, as the load at {path} depends on the states")
     return {
-        str(path): {"effort" if given.effort else "flow": given.value} for path, given in scene_inputs(scene).items()
+        str(path): {"effort" if given.effort else "flow": given.at(0.0, states)}
+        for path, given in problem.signals.items()
     }
 
 

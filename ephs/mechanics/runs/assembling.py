@@ -90,9 +90,9 @@ def start_of(joints: FlatJoints, system: System, given: Mapping[Path, Array]) ->
     AssemblyError
         A joint stays open by more than the tolerance of assembly; it names the joint and the gap.
     """
-    places = {*joints.poses, *joints.relative}
+    places = {path for path in (*joints.poses, *joints.relative) if path is not None}
     carried = system.initial
-    placed = not places.isdisjoint(carried)
+    placed = not places.isdisjoint(carried) and not places <= given.keys()  # else nothing carried counts
     out = assembled(joints, system.state(), carried) if placed else system.state()
     out |= given
     if not (placed and places.isdisjoint(given)):

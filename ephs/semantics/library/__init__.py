@@ -122,7 +122,7 @@ def inductor(*, l: float) -> Storage:  # noqa: E741 - the field's symbol
 def thermal_capacity(
     *, c1: float | None = None, c2: float | None = None, capacity: float | None = None, temperature: float | None = None
 ) -> Storage:
-    """Thermal capacity; port s: E = c1*exp(s/c2), temperature θ = E/c2.
+    """Thermal capacity; port s: E = c1*exp(s/c2), temperature θ = E/c2; ledgers count energies from s = 0, E − c1.
 
     Either c1 in J and c2 in J/K, or ``capacity`` C in J/K and ``temperature`` θ₁ in K at s = 0: c1 = C θ₁, c2 = C.
     """

@@ -16,6 +16,7 @@ from typing import Any, Literal, TypeAlias, final
 import numpy as np
 
 from ephs.operad import ROOT, Algebra, Directory, Interface, Path, Pattern
+from ephs.operad.wellformed import read_fillings
 from ephs.semantics.bundles.bundle import Array, Bundle, Reference
 from ephs.semantics.bundles.errors import AssemblyError, SemanticsError, listed
 from ephs.semantics.meaning.base import BasePoint, StateClass, Values, component_classes, glued_classes, names_of, place
@@ -76,7 +77,6 @@ class Relation:
         self,
         state: Values | None = None,
         ports: Values | None = None,
-        *,
         efforts: Values | None = None,
     ) -> "Instant":
         """The fibre over a point of the base; empty where values of one state differ.
@@ -111,7 +111,7 @@ class Relation:
         _ = found.linear  # what has no value says so here
         return found
 
-    def compose(self, pattern: Pattern, fillings: Mapping[Path, object]) -> "Relation":
+    def compose(self, pattern: Pattern, fillings: Mapping[Path, object] | Mapping[str, object]) -> "Relation":
         """Fill the boxes of a pattern with relations, systems and primitives; the latter mean their relations.
 
         Raises
@@ -121,7 +121,7 @@ class Relation:
             reference environments.
         """
         parts: dict[Path, Relation] = {}
-        for box, filling in fillings.items():
+        for box, filling in read_fillings(fillings, {}).items():
             if isinstance(filling, Relation):
                 if filling.reference != self.reference:
                     raise SemanticsError("references", box, found=filling.reference, expected=self.reference)
