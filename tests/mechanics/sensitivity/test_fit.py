@@ -121,15 +121,6 @@ def test_a_search_may_begin_at_zero():
     assert [read(found.model, path) for path in found.values] == list(found.values.values())
 
 
-@pytest.mark.parametrize("bounds", [{}, {"joints.j0.friction": (0.0, 0.5)}])
-def test_a_search_may_begin_on_a_bound(bounds):
-    """Several frictions at once, of which there are none at first."""
-    scene, paths = double_pendulum(), ["joints.j0.friction", "joints.j1.friction"]
-    data = record(scene, ("j0", "j1"), 0.6, 13)
-    found = ephs.fit(scene, data, paths, start=dict.fromkeys(paths, 0.0), bounds=bounds, rtol=1e-9, atol=1e-11)
-    assert list(found.values.values()) == pytest.approx([0.3, 0.2], rel=1e-6) and found.converged
-
-
 def test_a_number_alone_that_no_reading_shows_has_no_error_bound():
     """A rest without a stiffness: what its derivative has is rounding."""
     scene = double_pendulum()
