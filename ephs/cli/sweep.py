@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 _TEXTS = {
     "vary": "--vary {found}: expected PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,..., as in bodies.crank.mass=0.1:0.5:9",
     "none": "ephs sweep {file}: found nothing to vary, expected --vary PATH=FROM:TO:COUNT, bodies.crank.mass=0.1:0.5:9",
+    "twice": "--vary {path}: found twice, expected all values of a path in one, PATH=VALUE,VALUE,...",
     "dask": "--dask {address}: {found}; start a scheduler there, then run again",
 }
 LISTED = 5
@@ -46,9 +47,9 @@ def sweep(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     paired: bool = False,
     output_of: Annotated[list[str] | None, Parameter(name=["--output-of"])] = None,
-    instants: int = 100,
+    instants: Annotated[int, Parameter(validator=positive)] = 100,
     stepping: Stepping = AS_CHOSEN,
-    workers: int | None = None,
+    workers: Annotated[int | None, Parameter(validator=positive)] = None,
     dask: str | None = None,
     loading: LoadOptions = AS_GIVEN,
 ) -> int:
@@ -78,7 +79,11 @@ def sweep(
     """
     if not vary:
         raise BadInput(_TEXTS["none"].format(file=scene))
-    values = dict(_values(entry) for entry in vary)
+    values: dict[str, list[float]] = {}
+    for path, numbers in map(_values, vary):
+        if path in values:
+            raise BadInput(_TEXTS["twice"].format(path=path))
+        values[path] = numbers
     model = load_model(scene, loading)
     with addressed(scene, output):
         output.mkdir(parents=True, exist_ok=True)

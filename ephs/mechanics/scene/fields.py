@@ -270,6 +270,16 @@ def _of_layers(key: str) -> NumberField:
     return _within("shells", read, write, faults=_table_faults("shells"), table=True)
 
 
+def _of_pairs(key: str, **more: Any) -> NumberField:
+    """Numbers of joints that elements of beams have not, whose own law is that of their strain."""
+    plain = _attribute("joints", key, **more)
+
+    def get(scene: Scene, name: str) -> Array:
+        return plain.get(scene, name) if scene.joint(name).strain is None else np.zeros(0)
+
+    return replace(plain, get=get)
+
+
 def fields_of(kind: str) -> Mapping[str, NumberField]:
     """Key of the scene file -> its numbers, of a kind of element; none where there is no such kind."""
     return _registered(REGISTERED[kind]) if kind in REGISTERED else FIELDS.get(kind, {})
@@ -296,11 +306,11 @@ FIELDS: Mapping[str, Mapping[str, NumberField]] = {
     },
     "joints": {
         "pitch": _attribute("joints", "pitch", moves="frame"),
-        "friction": _attribute("joints", "friction", spread=True, faults=_friction_faults),
+        "friction": _of_pairs("friction", spread=True, faults=_friction_faults),
         **{f"dry.{key}": _law("dry", key, _rubbed) for key in DryEntry.model_fields},
-        "stiffness": _attribute("joints", "stiffness", spread=True, faults=_stiffness_faults),
-        "rest": _attribute("joints", "rest", faults=_stiffness_faults),
-        "drive": _attribute("joints", "drive"),
+        "stiffness": _of_pairs("stiffness", spread=True, faults=_stiffness_faults),
+        "rest": _of_pairs("rest", faults=_stiffness_faults),
+        "drive": _of_pairs("drive"),
         "coordinate": _within(
             "joints",
             lambda joint: coupling_of(joint).coordinates(joint.coordinate),

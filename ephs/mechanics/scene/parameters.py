@@ -2,7 +2,8 @@
 
 Paths of a scene are keys of its file, names in parts dotted: ``bodies.crank.mass``, ``bodies.left.crank.inertia[0]``,
 ``joints.pin.friction``, ``joints.pin.frame1.position[2]``, ``springs.s.length``, ``contacts.foot_floor.friction``,
-``world.gravity[2]``, ``shells.skin.layers[0].E1``. Those of a system are its components' parameters: ``osc.pe.k``.
+``world.gravity[2]``, ``shells.skin.layers[0].E1``. Those of a system are its components' parameters, ``osc.pe.k``, and
+its initial values by the paths of states, ``osc.pe.q``.
 
 Positions mean what they mean in a file whose joints are given by ``at`` and ``axis``: a body's ``position`` moves its
 centre of mass (with its axes, springs and markers) while its joints stay where they are in the world, a joint's ``at``
@@ -13,6 +14,7 @@ it: joints keep what is not varied, unless they close a loop; then the nearest s
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, TypeVar, final
 
 import numpy as np
@@ -21,6 +23,7 @@ from ephs.mechanics.scene.errors import Fault, SceneError, did_you_mean, fault, 
 from ephs.mechanics.scene.fields import FIELDS, NumberField, fields_of, placed
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.registry import REGISTERED
+from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.primitives.primitives import Storage
@@ -42,6 +45,8 @@ def read(model: Scene | System, path: str) -> float:
         A scene, a system has no such number; the message names the nearest one.
     """
     if isinstance(model, System):
+        if (start := _start(model, path)) is not None:
+            return float(start[1][start[2]])
         return _component(model, path)[2]
     if not isinstance(model, Scene):
         raise no_model(model)
@@ -72,10 +77,9 @@ def varied(model: Model, values: Mapping[str, float], *, strict: bool = True) ->
 
 
 def names(model: Scene | System) -> list[str]:
-    """All paths that `read` takes, entries of vectors one by one."""
+    """All paths that `read` takes, entries of vectors one by one; of a system those of parameters."""
     if isinstance(model, System):
-        leaves = ((path, filling) for path, filling in model.leaves() if filling.name in _library())
-        return [f"{path}.{key}" for path, filling in leaves for key, _ in filling.parameters]
+        return [f"{path}.{key}" for path, filling in model.leaves() for key in _numbers(filling)]
     return list(_paths(model))
 
 
@@ -211,24 +215,48 @@ def _library() -> dict[str, Callable[..., Filling]]:
     return {name: getattr(library, name) for name in library.__all__}
 
 
+def _numbers(filling: Filling) -> dict[str, float]:
+    """Parameters of a library component that are numbers: not a reaction's equation."""
+    entries: tuple[tuple[str, Any], ...] = filling.parameters if filling.name in _library() else ()
+    return {key: float(value) for key, value in entries if isinstance(value, Real)}
+
+
+def _start(system: System, path: str) -> tuple[Path, Array, int] | None:
+    """State of a vector space, its values (size,) and the entry at a path; None where no state has this path."""
+    stem, index = _INDEX.split(path)[:2]
+    state = next((state for state in system.states if str(state) == stem), None)
+    if state is None:
+        return None
+    of, values = system.states[state].space, system.state()[state]
+    entries = [int(number) for number in re.findall(r"\d+", index)] or [0] * (of.size == 1)
+    if of.size != of.dim or len(entries) != 1 or entries[0] >= of.size:
+        shape = f"[0…{of.size - 1}]" if of.size == of.dim else "of a state on a vector space: this one is on a group"
+        raise AssemblyError("entry", path, shape=shape)
+    return state, values, entries[0]
+
+
 def _component(system: System, path: str) -> tuple[Filling, str, float]:
     """The component at a path, the parameter's name and its value."""
     box, _, key = path.rpartition(".")
-    found = next((filling for at, filling in system.leaves() if str(at) == box and filling.name in _library()), None)
-    parameters: dict[str, Any] = {} if found is None else dict(found.parameters)
-    if found is not None and key in parameters:
-        return found, key, float(parameters[key])
-    known = names(system)
+    found = next((filling for at, filling in system.leaves() if str(at) == box), None)
+    if found is not None and key in (parameters := _numbers(found)):
+        return found, key, parameters[key]
+    known = [*names(system), *map(str, system.states)]
     raise AssemblyError("unknown-parameter", path, hint=did_you_mean(path, known, f"there are: {listing(known)}"))
 
 
 def _system(system: System, values: Mapping[str, float]) -> System:
     changes: dict[str, dict[str, float]] = {}
+    starts: dict[Path, Array] = {}
     for path, value in values.items():
+        if (start := _start(system, path)) is not None:
+            starts.setdefault(start[0], start[1])[start[2]] = value
+            continue
         _component(system, path)
         box, _, key = path.rpartition(".")
         changes.setdefault(box, {})[key] = float(value)
-    return _refilled(system, (), changes)
+    found = _refilled(system, (), changes)
+    return found.with_initial(starts) if starts else found
 
 
 def _refilled(filling: Any, at: tuple[str, ...], changes: Mapping[str, Mapping[str, float]]) -> Any:

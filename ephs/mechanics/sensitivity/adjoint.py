@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
+from ephs.mechanics.runs.signals import numbers_of
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
@@ -91,15 +92,15 @@ def gradient(
     """
     if not isinstance(method, Method) and method not in ("rk54", "rk87"):
         raise OptionError("method", method, "rk54, rk87 or an ephs.Method")
-    if not parameters:
-        raise OptionError("parameters", parameters, "at least one path")
     family = ParameterFamily(model, parameters, initial, inputs, None, joints=True)
     forward = ExplicitTangent(family, t0, tableau(method, chosen=step is None))
     if not family.problem.constant:
         raise OptionError("inputs", "a function", "constants; ephs.sensitivity takes functions of time")
-    wanted = np.atleast_1d(np.asarray(times, dtype=float))
-    if not (wanted.size and np.all(np.diff(wanted) > 0.0) and wanted[0] > t0):
+    wanted = numbers_of(times)
+    if wanted is None or not (wanted.ndim == 1 and wanted.size and np.all(np.diff(wanted) > 0.0) and wanted[0] > t0):
         raise OptionError("times", times, f"ascending times after {t0:g} s")
+    if not isinstance(weights, Mapping) or not weights:
+        raise OptionError("weights", weights, "a joint's reading and its weights at least")
     control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": method, "inputs": inputs}
     grid = np.union1d(simulate(model, float(wanted[-1]), **run, **control).t, wanted)
@@ -112,7 +113,7 @@ def _taken_back(
 ) -> Gradient:
     """The gradient along the steps of a grid, which end at the wanted times too."""
     point, eq = forward.begin(), forward.equations
-    seeds = [_seed(eq, name, np.asarray(given, dtype=float), wanted.size) for name, given in weights.items()]
+    seeds = [_seed(eq, name, numbers_of(given), wanted.size) for name, given in weights.items()]
     steps = StepAdjoint(eq.engine, partial(relation_of, family.problem.descriptor), forward.tangents[0][1])
     q, y = point.state.q, eq.vector(point.state)
     states, value = list[tuple[Array, Array]](), 0.0
@@ -141,17 +142,18 @@ def _taken_back(
     return Gradient(value, dict(zip(names, found.tolist(), strict=True)), steps.tables)
 
 
-def _seed(eq: ReducedEquations, name: str, weights: Array, count: int) -> tuple[Index, bool, Array]:
+def _seed(eq: ReducedEquations, name: str, weights: Array | None, count: int) -> tuple[Index, bool, Array]:
     """Places of a reading in q or y, which of both, and its weights (n, d)."""
-    path, _, key = name.rpartition(".")
+    path, _, key = str(name).rpartition(".")
     joint = path if path in eq.layout.freedoms else path.removeprefix("joints.")
     freedoms = eq.layout.freedoms.get(joint)
     parts = eq.layout.edges.get(joint, ())
     flat = freedoms is not None and all(edge.pair.code == VECTOR for _, edge in parts) and freedoms.max() < eq.n
     if freedoms is None or not flat or key not in ("coordinate", "rate"):
         raise OptionError("weights", name, "joints.….coordinate or joints.….rate of a joint of the tree, not a ball's")
-    if weights.size != count * freedoms.size:
-        raise OptionError(f"weights[{name!r}]", weights.shape, f"({count}, {freedoms.size})")
+    if weights is None or weights.size != count * freedoms.size:
+        found = "no numbers" if weights is None else weights.shape
+        raise OptionError(f"weights[{name!r}]", found, f"({count}, {freedoms.size})")
     if not np.all(np.isfinite(weights)):
         raise OptionError(f"weights[{name!r}]", weights.tolist(), "finite numbers")
     where = eq.layout.elements[joint] if key == "coordinate" else eq.nv + freedoms

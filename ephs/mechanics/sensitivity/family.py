@@ -128,7 +128,8 @@ class ParameterFamily:
         *,
         joints: bool = False,
     ) -> None:
-        if isinstance(paths, str) or not isinstance(paths, Sequence) or not paths or len(set(paths)) < len(paths):
+        several = isinstance(paths, Sequence) and not isinstance(paths, str) and all(isinstance(p, str) for p in paths)
+        if not several or not paths or len(set(paths)) < len(paths):
             raise OptionError("parameters", paths, "one path or several, each once, as a list")
         self.model, self._reference, self._joints = model, reference, joints
         self._initial, self._inputs = dict(initial or {}), dict(inputs or {})
@@ -138,13 +139,21 @@ class ParameterFamily:
                 if path.startswith("joints.") and joint and f"joints.{joint}" not in self._inputs:
                     self._inputs[f"joints.{joint}"] = np.zeros(model.joint(joint).dim)
         self._neighbours: dict[tuple[str, float], Problem] = {}
+        self._replaced: dict[str, float] = {}
         self.problem = self._made({})
         if (path := self.problem.descriptor.strikes) is not None:
             raise OptionError("model", str(path), "a contact with a stiffness: impulses have no derivative")
         self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
-        idle = {path: NEXT_TO_NOTHING for path in paths if _is_omitted(path) and not self._read(path)}
-        if idle:
-            self.problem = self._made(idle)
+        for path in paths:
+            value = self._read(path)
+            if _is_omitted(path) and not value:
+                self._replaced[path] = NEXT_TO_NOTHING
+            elif abs(value) == 1.0:  # equations may have a product less
+                near = float(np.nextafter(value, 2.0 * value))
+                if not _alike(self.problem.descriptor, self._made({path: near}).descriptor):
+                    self._replaced[path] = near
+        if self._replaced:
+            self.problem = self._made({})
         self.parameters = tuple(self._parameter(path) for path in paths)
 
     def at(self, number: int, offset: float) -> Problem:
@@ -164,19 +173,19 @@ class ParameterFamily:
         step = (WIDE if linear else RELATIVE) * max(abs(value) or 1.0, LEAST if signed else 0.0)
         if self._joints and value > 0.0 and path.partition("[")[0].endswith(("mass", "inertia")):
             return Parameter(path, value, step, CENTRAL, STRAIGHT)  # neighbours are models, too
+        reason: Exception | None = None
         for stencil in (CENTRAL, FORWARD):
             try:
                 tables = STRAIGHT if linear and stencil is CENTRAL else stencil
                 beside = [self._beside(path, value, k * step) for k, _ in (tables[0], tables[-1])]
-            except (SceneError, StructureError):
-                if stencil is FORWARD:
-                    raise
+            except (SceneError, StructureError) as error:
+                reason = error
                 continue
             if not all(_alike(self.problem.descriptor, other.descriptor) for other in beside):
-                expected = "a number that leaves equations as they are: no pitch, no 0 or 1 that simplifies them"
+                expected = "a number that leaves equations as they are: no pitch, no 0 that simplifies them"
                 raise OptionError("parameters", path, expected)
             return Parameter(path, value, step, stencil, tables)
-        raise OptionError("parameters", path, "a number that may change")
+        raise OptionError("parameters", path, f"a number that may change: {reason}") from reason
 
     def _read(self, path: str) -> float:
         if isinstance(self.model, System):
@@ -191,6 +200,7 @@ class ParameterFamily:
         return read(self.model, path)
 
     def _made(self, values: Mapping[str, float]) -> Problem:
+        values = {**self._replaced, **values}
         if isinstance(self.model, Scene):
             scene = varied(self.model, values, strict=False) if values else self.model
             return problem_of_scene(scene, self._initial or None, self._inputs)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.runs.signals import numbers_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
@@ -14,15 +15,21 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, NEIGHBOUR, TINY
 from ephs.semantics.systems.system import System
-from ephs.solve.posing.errors import OptionError, nearest_of, no_model
+from ephs.solve.posing.errors import OptionError, count_of, nearest_of, no_model, number_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-XTOL, FTOL, GTOL = 1e-9, 1e-12, 1e-14
-"""Changes of parameters, of the sum of squares and its gradient, relative, at which a fit ends."""
+XTOL, FTOL, GTOL = 1e-9, 1e-12, float(np.finfo(float).eps)
+"""Changes of parameters and of the sum of squares, relative, and gradients, as of `LARGE` records, that end a fit."""
+LARGE = 2.0**20
+"""The record's norm in a fit, so that of all gradients zero alone is below `GTOL`, which SciPy takes absolutely."""
+FIRST = 1e-6
+"""Part of the residual by which a number that starts at zero changes it at once: SciPy's first steps are as large."""
+UNSEEN = 1e-12
+"""Change of readings, relative to the record, that is rounding if a number changes by its own size."""
 POSITIVE = ("mass", "friction", "stiffness", "damping", "length", "capacity", "temperature", "conductance")
 """Numbers of a scene that are not negative unless bounds say so; so are the diagonal of an inertia, and what the
 components of a system take."""
@@ -44,7 +51,7 @@ class Fit:
     deviation
         The residuals' standard deviation, in units of ``sigma``.
     model
-        The scene or system with these numbers (initial values of a system excepted).
+        The scene or system with these numbers.
     solution
         Its motion at the times of the record.
     iterations
@@ -93,7 +100,7 @@ def fit(
     parameters
         Paths, as for `sensitivity`, including initial values.
     start
-        Path -> start value of the search; by default the model's own.
+        Path -> start value of the search, within its bounds; by default the model's own, or the nearest in bounds.
     bounds
         Path -> (least, most). By default masses, friction, stiffness, moments of inertia and the like, and all
         parameters of a system's components, are not negative.
@@ -108,36 +115,52 @@ def fit(
     ------
     OptionError
         A record does not fit its reading, or there are fewer numbers in it than parameters; start values, bounds or
-        deviations are of other names, bounds of a wrong order, or deviations not positive.
+        deviations are of other names, or no numbers, bounds of a wrong order, start values beyond them, or deviations
+        not positive.
     SimulationError
         A motion could not be computed.
     """
     from scipy.optimize import least_squares
 
+    if isinstance(parameters, str) or not isinstance(parameters, Sequence) or not parameters:
+        raise OptionError("parameters", parameters, "one path or several, as a list")
     for name, given in (("start", start), ("bounds", bounds)):
         _check_names(name, given or {}, parameters)
-    for path, (least, most) in (bounds or {}).items():
-        if not least < most:
-            raise OptionError(f"bounds[{path!r}]", (least, most), "(least, most), the first below the second")
+    limits = {path: numbers_of(pair) for path, pair in (bounds or {}).items()}
+    for path, pair in limits.items():
+        if pair is None or pair.shape != (2,) or not pair[0] < pair[1]:
+            raise OptionError(f"bounds[{path!r}]", (bounds or {})[path], "(least, most), the first below the second")
     if not isinstance(model, Scene | System):
         raise no_model(model)
+    if isinstance(model, System):
+        model = model.with_initial(run.pop("initial", None) or {})
     record = _RecordedVector(model, data, sigma or {})
-    guess = {
-        path: float((start or {})[path]) if path in (start or {}) else _own(model, path, run) for path in parameters
-    }
-    lower, upper = np.array([(bounds or {}).get(path, _bounds(model, path)) for path in parameters], dtype=float).T
-    scale = np.array([abs(value) or 1.0 for value in guess.values()])
+    evaluations = count_of("max_evaluations", max_evaluations)
+    lower, upper = np.array([limits.get(path, _bounds(model, path)) for path in parameters], dtype=float).T
+    guess = np.clip([read(model, path) for path in parameters], lower, upper)
+    for i, path in enumerate(parameters):
+        if path in (start or {}):
+            expected = f"a number within [{lower[i]:g}, {upper[i]:g}]"
+            guess[i] = number_of(f"start[{path!r}]", (start or {})[path], expected)
+            if not (np.isfinite(guess[i]) and lower[i] <= guess[i] <= upper[i]):
+                raise OptionError(f"start[{path!r}]", guess[i], expected)
+    if record.size < guess.size:
+        raise OptionError("data", f"{record.size} numbers", f"{guess.size} or more, for as many parameters")
+    scale = np.where(guess, np.abs(guess), 1.0)
     runs = _FitRuns(model, tuple(parameters), record, run, scale)
-    x0 = np.clip(np.array(list(guess.values())), lower, upper) / scale
-    if record.size < x0.size:
-        raise OptionError("data", f"{record.size} numbers", f"{x0.size} or more, for as many parameters")
+    x0 = guess / scale
+    off = float(np.linalg.norm(runs.residual(x0)))
+    runs.gain = LARGE / (max(off, float(np.linalg.norm(record.recorded))) or LARGE)
+    seen, room = np.linalg.norm(runs.jacobian(x0), axis=0), np.where(upper > 0.0, upper, lower) / scale
+    first = FIRST * runs.gain * off / np.where(seen, seen, np.inf)
+    x0 = np.where(x0, x0, np.sign(room) * np.fmin(first, 0.5 * np.abs(room)))
     jacobian_of: Any = runs.jacobian
     found = least_squares(
         runs.residual, x0, jac=jacobian_of, bounds=(lower / scale, upper / scale), x_scale="jac",
-        xtol=XTOL, ftol=FTOL, gtol=GTOL, max_nfev=max_evaluations,
+        xtol=XTOL, ftol=FTOL, gtol=GTOL, max_nfev=evaluations,
     )  # fmt: skip
     values = dict(zip(parameters, (found.x * scale).tolist(), strict=True))
-    residual, jacobian = runs.residual(found.x), runs.jacobian(found.x)
+    residual, jacobian = (each(found.x) / runs.gain for each in (runs.residual, runs.jacobian))
     freedom = max(1, record.size - x0.size)
     deviation = float(np.sqrt(residual @ residual / freedom))
     covariance, errors = _covariance(jacobian / scale, deviation)
@@ -161,18 +184,22 @@ class _RecordedVector:
     """Recorded values as one vector."""
 
     def __init__(self, model: System | Scene, data: Mapping[str, "ArrayLike"], sigma: Mapping[str, float]) -> None:
-        if "t" not in data or len(data) < 2:
-            raise OptionError("data", sorted(data), "the times t, and a reading at least")
-        self.t = np.asarray(data["t"], dtype=float)
-        self.values = {name: np.asarray(values, dtype=float) for name, values in data.items() if name != "t"}
+        if not isinstance(data, Mapping) or "t" not in data or len(data) < 2:
+            raise OptionError("data", sorted(data) if data else data, "the times t, and a reading at least")
+        found = {name: numbers_of(values) for name, values in data.items()}
+        for name, values in found.items():
+            if values is None:
+                raise OptionError(f"data[{name!r}]", data[name], "numbers")
+        self.values: dict[str, Array] = {name: np.asarray(values) for name, values in found.items()}
+        self.t = self.values.pop("t")
+        if not (self.t.ndim == 1 and np.all(np.isfinite(self.t)) and np.all(np.diff(self.t) > 0.0)):
+            raise OptionError("data['t']", self.t.tolist(), "ascending times in s")
         for name, values in self.values.items():
             if values.shape[:1] != self.t.shape:
                 raise OptionError(f"data[{name!r}]", values.shape, f"({self.t.size}, …): one row a time")
-        if not (np.all(np.isfinite(self.t)) and np.all(np.diff(self.t) > 0.0)):
-            raise OptionError("data['t']", self.t.tolist(), "ascending times in s")
         _check_names("sigma", sigma, [*self.values, "t"])
         for name, deviation in sigma.items():
-            if not 0.0 < deviation < np.inf:
+            if not 0.0 < number_of(f"sigma[{name!r}]", deviation, "a number > 0") < np.inf:
                 raise OptionError(f"sigma[{name!r}]", deviation, "a number > 0")
         self._readings = {name: reading_of(model, name) for name in self.values}
         self.kept = {name: np.isfinite(values) for name, values in self.values.items()}
@@ -221,30 +248,27 @@ class _FitRuns:
         scale: Array,
     ) -> None:
         self.model, self.paths, self.record, self.run, self.scale = model, paths, record, dict(run), scale
-        self.count = 0
+        self.count, self.gain = 0, 1.0
         self._last: tuple[Array, Sensitivity] | None = None
 
     def at(self, x: Array) -> Sensitivity:
         """The motion and its tangents."""
         if self._last is None or not np.array_equal(self._last[0], x):
             values = dict(zip(self.paths, (x * self.scale).tolist(), strict=True))
-            run = dict(self.run)
-            initial = {p: v for p, v in values.items() if isinstance(self.model, System) and _is_state(self.model, p)}
-            if initial:
-                run["initial"] = {**(run.get("initial") or {}), **initial}
-            until = float(self.record.t[-1])
-            model = _with(self.model, values)
-            self._last = np.array(x), sensitivity(model, self.paths, until, save_at=self.record.t, **run)
+            model, until = _with(self.model, values), float(self.record.t[-1])
+            self._last = np.array(x), sensitivity(model, self.paths, until, save_at=self.record.t, **self.run)
             self.count += 1
         return self._last[1]
 
     def residual(self, x: Array) -> Array:
-        """Computed less recorded, weighted."""
-        return self.record.vector(self.at(x).solution) - self.record.recorded
+        """Computed less recorded, weighted, times the gain."""
+        return (self.record.vector(self.at(x).solution) - self.record.recorded) * self.gain
 
     def jacobian(self, x: Array) -> Array:
-        """Its derivative by the scaled parameters."""
-        return self.at(x).of(self.record.vector) * self.scale
+        """Its derivative by the scaled parameters, zero where it is rounding."""
+        out = self.at(x).of(self.record.vector) * self.scale * self.gain
+        unseen = np.linalg.norm(out, axis=0) * np.maximum(np.abs(x), 1.0) < UNSEEN * LARGE
+        return np.where(unseen, 0.0, out)
 
 
 def _covariance(jacobian: Array, deviation: float) -> tuple[Array, Array]:
@@ -259,30 +283,14 @@ def _covariance(jacobian: Array, deviation: float) -> tuple[Array, Array]:
     return covariance, np.sqrt(np.diag(covariance))
 
 
-def _is_state(system: System, path: str) -> bool:
-    return path.partition("[")[0] in {str(slot.path) for slot in system.descriptor().states}
-
-
-def _own(model: System | Scene, path: str, run: Mapping[str, Any]) -> float:
-    if isinstance(model, System) and _is_state(model, path):
-        stem, _, entry = path.partition("[")
-        given = model.state(run.get("initial"))
-        return float(
-            next(value for key, value in given.items() if str(key) == stem)[int(entry[:-1] or 0) if entry else 0]
-        )
-    return read(model, path)
-
-
 def _with(model: System | Scene, values: Mapping[str, float]) -> System | Scene:
-    if isinstance(model, Scene):
-        return varied(model, values, strict=False)
-    return varied(model, {path: value for path, value in values.items() if not _is_state(model, path)})
+    return varied(model, values, strict=False)
 
 
 def _bounds(model: System | Scene, path: str) -> tuple[float, float]:
     """The bounds of a number that none are given for."""
     if isinstance(model, System):
-        return (-np.inf if _is_state(model, path) else 0.0), np.inf
+        return (-np.inf if path.partition("[")[0] in map(str, model.states) else 0.0), np.inf
     stem, _, entry = path.partition("[")
     key = stem.rpartition(".")[2]
     moment = key == "inertia" and entry[:1] in ("0", "1", "2")

@@ -23,7 +23,7 @@ def reading_of(model: System | Scene, name: str) -> Reading:
     OptionError
         There is nothing of that name.
     """
-    stem, bracket, entry = name.partition("[")
+    stem, bracket, entry = str(name).partition("[")
     whole = outputs_of(model, [stem])[0].read
     if not bracket:
         return whole

@@ -163,7 +163,11 @@ def sensitivity(
         raise OptionError("save_at", save_at, "ascending times in s")
     grid = simulate(model, until, **run, **control).t
     if times is not None and not (
-        times.size and np.all(np.diff(times) > 0.0) and grid[0] <= times[0] and times[-1] <= grid[-1]
+        times.ndim == 1
+        and times.size
+        and np.all(np.diff(times) > 0.0)
+        and grid[0] <= times[0]
+        and times[-1] <= grid[-1]
     ):
         raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
     with differentiated(parameters, float(grid[0])):

@@ -45,8 +45,8 @@ class Axes:
         OptionError
             There is nothing to vary, a value is no finite number, or paired paths have different numbers of values.
         """
-        if not vary:
-            raise OptionError("vary", dict(vary), "a path and its values, such as {'bodies.crank.mass': [0.1, 0.2]}")
+        if not vary or not isinstance(vary, Mapping) or not all(isinstance(path, str) for path in vary):
+            raise OptionError("vary", vary, "a path and its values, such as {'bodies.crank.mass': [0.1, 0.2]}")
         values: list[Array] = []
         for path, given in vary.items():
             try:

@@ -89,6 +89,8 @@ def outputs_of(model: "Scene | System", names: Sequence[str] | None) -> tuple[Ou
             names += ["heat", "work"]
         else:
             names = [name for name in known if name not in TOTALS]
+    if isinstance(names, str):
+        raise OptionError("outputs", names, "names of outputs, as a list")
     for name in names:
         if name not in known:
             raise unknown_output("outputs", name, known)
@@ -120,9 +122,9 @@ def _of_mechanism(joints: Mapping[str, Labels], bodies: Iterable[str]) -> "Itera
 
 def unknown_output(option: str, name: str, known: Iterable[str]) -> OptionError:
     """Error of a name that no output has; suggestions are of the same kind: a joint's for a joint's."""
-    kind = name.partition(".")[0]
+    kind = str(name).partition(".")[0]
     alike = [other for other in known if other.partition(".")[0] == kind] or list(known)
-    hint = did_you_mean(name, alike, f"one of {listing(alike)}")
+    hint = did_you_mean(str(name), alike, f"one of {listing(alike)}")
     return OptionError(option, name, f"the name of an output; {hint}")
 
 

@@ -17,7 +17,7 @@ from ephs.mechanics.sweep.job import DONE, Job, MemberBatch
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.semantics.bundles.errors import listed
 from ephs.solve.equations.sparse import Index
-from ephs.solve.posing.errors import OptionError, number_of
+from ephs.solve.posing.errors import OptionError, count_of, number_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,8 +76,8 @@ def sweep(
     Parameters
     ----------
     vary
-        Path -> (n,) values: ``bodies.crank.mass``, ``joints.pin.friction``, ``joints.pin.rate``, ``osc.pe.k``; see
-        `ephs.mechanics.scene.parameters`.
+        Path -> (n,) values: ``bodies.crank.mass``, ``joints.pin.friction``, ``joints.pin.rate``; of a system
+        ``osc.pe.k``, and initial values such as ``osc.pe.q``; see `ephs.mechanics.scene.parameters`.
     until, t0
         End and start in s.
     save_at
@@ -119,17 +119,21 @@ def sweep(
         raise OptionError(unknown[0], options[unknown[0]], f"no such option; there are {listed(unknown[0], _OPTIONS)}")
     for path in axes.paths:
         read(model, path)
+    threads = (os.cpu_count() or 1) if workers is None else count_of("workers", workers)
     start, end = number_of("t0", t0), number_of("until", until)
+    if not (np.isfinite(end - start) and end != start):
+        raise OptionError("until", until, f"a finite time other than t0 = {start:g} s")
     if save_at is None:
         save_at = start + (end - start) * np.arange(INSTANTS + 1) / INSTANTS
     times = times_of(save_at, start, end)
-    assert times is not None  # instants were chosen
+    if times is None or not times.size:
+        raise OptionError("save_at", save_at, "at least one time in s")
     kept = outputs_of(model, outputs)
     job = Job(Job.document(model), axes, start, end, times, dict(options), kept, uuid.uuid4().hex, _own(model))
     count = len(axes.members)
     batches: list[MemberBatch] = []
     begin = time.perf_counter()
-    run = _on_threads(job, count, workers) if client is None else _on_cluster(job, count, client)
+    run = _on_threads(job, count, threads) if client is None else _on_cluster(job, count, client)
     try:
         for batch in run:
             batches.append(batch)
@@ -148,8 +152,7 @@ def _parts(count: int, workers: int) -> list[Index]:
     return [np.arange(at, min(at + size, count)) for at in range(0, count, size)]
 
 
-def _on_threads(job: Job, count: int, workers: int | None) -> Generator[MemberBatch, None, None]:
-    threads = workers or os.cpu_count() or 1
+def _on_threads(job: Job, count: int, threads: int) -> Generator[MemberBatch, None, None]:
     job.prepare()
     with ThreadPoolExecutor(threads) as pool:
         waiting: set[Future[MemberBatch]] = {pool.submit(job.run, part) for part in _parts(count, threads)}
@@ -211,7 +214,7 @@ def _table(job: Job, batches: Sequence[MemberBatch], model: "System | Scene", se
     members = (MEMBER,) if axes.paired else names
     for i, output in enumerate(job.outputs):
         found = [(batch.numbers, batch.values[i]) for batch in batches if batch.values]
-        width = found[0][1].shape[2] if found else 1
+        width = len(output.labels.units)
         whole = np.full((count, instants, width), np.nan)
         for numbers, values in found:
             whole[numbers] = values

@@ -89,7 +89,8 @@ _TEXTS = {
     "references": (
         "{path}: the relation is relative to {found}, the others to {expected}; take relations to one reference"
     ),
-    "unknown-parameter": "{path}: not a parameter of a library component; {hint}",
+    "unknown-parameter": "{path}: neither a number of a library component nor a state; {hint}",
+    "entry": "{path}: expected an entry {shape}; give the index of one entry",
     "elements": (
         "{path}: {equation} does not conserve {element}: {found} of it in a reaction, expected 0; mend the equation or "
         "the elements of the species"

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import UNSOLVED, RowBlocks, record_of
@@ -11,7 +13,7 @@ from ephs.solve.running.stepping import Row
 
 
 def replay(problem: Problem, t: Array, rows: Sequence[Row], remark: str) -> Solution:
-    """The solution of what is kept at the times t; ``remark`` stands for the method."""
-    found = record_of([(float(when), None, 0.0) for when in t], rows)
+    """The solution of what is kept at the times t; ``remark`` stands for the method. What steps made is not known."""
+    found = record_of([(float(when), None, np.nan) for when in t], rows)
     record = found if rows else RowBlocks().whole(problem.descriptor)
     return solution_of(problem, record, {**UNSOLVED, "method": remark, "steps": max(0, len(rows) - 1)})

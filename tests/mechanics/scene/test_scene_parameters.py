@@ -1,11 +1,16 @@
 """Numbers of a model by path: what is written is read, nothing else changes, loops stay closed."""
 
+import re
+
 import numpy as np
 import pytest
 
 import ephs
 from ephs import library as lib
 from ephs.mechanics.scene.parameters import names, read, varied
+from tests.mechanics.written_scenes import WRITTEN
+from tests.semantics.test_chemistry import GASES
+from tests.written import scene_of_text
 
 SCENES = ("four-bar", "slider-crank", "heavy-top", "chain", "universal")
 
@@ -95,6 +100,39 @@ def test_values_out_of_their_range_are_refused(path, value):
     with pytest.raises(ephs.SceneError) as error:
         varied(scene, {path: value})
     assert path.split("[")[0] in str(error.value)
+
+
+def test_states_of_a_system_have_paths_too():
+    """Of vector spaces, by entry where they have several numbers; other numbers stay."""
+    body = ephs.mechanics.rigid_body(2.0, [0.1, 0.2, 0.3])
+    system = ephs.Pattern(junctions={"p": ephs.junction(ephs.quantity.body_momentum)}, boxes={"it": {"p": "p"}})(
+        it=body
+    )
+    found = varied(system, {"it.ke.p[4]": 3.0, "it.ke.p[0]": 0.5})
+    assert [read(found, f"it.ke.p[{k}]") for k in range(6)] == [0.5, 0.0, 0.0, 0.0, 3.0, 0.0]
+    for path in ("it.ke.p", "it.ke.p[6]", "it.pe.q[0]"):
+        with pytest.raises(ephs.AssemblyError, match="an entry"):
+            read(system, path)
+
+
+def test_only_numbers_of_components_are_parameters():
+    """Not the species of a mixture, and not its phase."""
+    gas = lib.ideal_mixture(species=GASES)
+    ports = {str(port): ephs.junction(of.quantity, exposed=True) for port, of in gas.interface.items()}
+    system = ephs.Pattern(junctions=ports, boxes={"gas": {port: port for port in ports}})(gas=gas)
+    assert names(system) == []
+    with pytest.raises(ephs.AssemblyError, match="neither a number"):
+        read(system, "gas.phase")
+
+
+def test_elements_of_beams_have_no_law_of_a_joint():
+    """Theirs is the section's: what would change nothing has no path, and forces within have no port."""
+    scene = scene_of_text("format = 1\n" + WRITTEN["rib"])
+    assert not [path for path in names(scene) if re.match(r"joints\.rib-\d\.(friction|stiffness|rest|drive)", path)]
+    with pytest.raises(ephs.SceneError, match="there is no such number"):
+        varied(scene, {"joints.rib-1.drive[5]": 1.0})
+    with pytest.raises(ephs.AssemblyError, match=r"joints\.rib-1: no such outer power port"):
+        ephs.simulate(scene, 0.01, inputs={"joints.rib-1": [0.0] * 6})
 
 
 def test_components_of_a_system_have_paths_too():

@@ -101,11 +101,39 @@ def test_what_a_record_does_not_tell_has_no_error_bound():
     assert all(np.isinf(error) for error in found.errors.values())
 
 
+@pytest.mark.parametrize("size", [1e-12, 1e-7, 1.0, 1e6])
+def test_a_record_of_any_size_gives_the_same(size):
+    """The oscillator is linear: its numbers do not depend on the unit of its displacement."""
+    run = {"step": 0.05, "initial": {"osc.pe.q": size}}
+    truth = ephs.simulate(damped_oscillator(), 1.0, **run)
+    data = {"t": truth.t, "osc.pe.q": truth["osc.pe.q"]}
+    found = ephs.fit(damped_oscillator(), data, ["osc.pe.k", "mf.d"], start={"osc.pe.k": 4.0, "mf.d": 0.5}, **run)
+    assert list(found.values.values()) == pytest.approx([1.5, 0.1], rel=1e-9)
+    assert found.converged and found.deviation < 1e-12 * size
+
+
+def test_a_search_may_begin_at_zero():
+    """Which has no size of its own."""
+    truth = ephs.simulate(damped_oscillator(), 1.0, step=0.05, initial={"osc.pe.q": 1e-3, "osc.ke.p": 2e-3})
+    data = {"t": truth.t, "osc.pe.q": truth["osc.pe.q"]}
+    found = ephs.fit(damped_oscillator(), data, ["osc.pe.q", "osc.ke.p"], step=0.05)
+    assert list(found.values.values()) == pytest.approx([1e-3, 2e-3], rel=1e-9)
+    assert [read(found.model, path) for path in found.values] == list(found.values.values())
+
+
+def test_a_number_alone_that_no_reading_shows_has_no_error_bound():
+    """A rest without a stiffness: what its derivative has is rounding."""
+    scene = double_pendulum()
+    found = ephs.fit(scene, record(scene, ("j0",), 0.3, 4), ["joints.j0.rest"], **STEPS)
+    assert found.values == {"joints.j0.rest": 0.0} and found.errors == {"joints.j0.rest": np.inf}
+
+
 @pytest.mark.parametrize(
     ("data", "what"),
     [({"osc.pe.q": [0.0]}, "times t"), ({"t": [0.0, 1.0], "osc.pe.q": [0.0]}, "one row a time"),
      ({"t": [0.0, 1.0], "osc.pe.q": [0.0, np.nan]}, "2 or more"),
-     ({"t": [1.0, 0.0], "osc.pe.q": [0.0, 1.0]}, "ascending times")],
+     ({"t": [1.0, 0.0], "osc.pe.q": [0.0, 1.0]}, "ascending times"),
+     ({"t": [0.0, 1.0], "osc.pe.q": ["0", "1"]}, "expected numbers"), (None, "times t")],
 )  # fmt: skip
 def test_records_that_do_not_fit_are_refused(data, what):
     with pytest.raises(ephs.OptionError, match=what):
@@ -117,6 +145,10 @@ def test_records_that_do_not_fit_are_refused(data, what):
     [({"start": {"osc.pe.m": 1.0}}, "start.*one of osc.pe.k.*did you mean"),
      ({"bounds": {"osc.pe": (0.0, 1.0)}}, "bounds.*one of"),
      ({"bounds": {"osc.pe.k": (1.0, 0.5)}}, "first below the second"),
+     ({"bounds": {"osc.pe.k": 1.0}}, "first below the second"),
+     ({"start": {"osc.pe.k": -1.0}}, r"start.*within \[0, inf\]"), ({"start": {"osc.pe.k": np.nan}}, "start.*within"),
+     ({"start": {"osc.pe.k": "stiff"}}, "start.*within"), ({"max_evaluations": 0}, "a whole number > 0"),
+     ({"sigma": {"osc.pe.q": "1"}}, "a number > 0"),
      ({"sigma": {"osc.pe.k": 1.0}}, "sigma.*one of osc.pe.q"),
      ({"sigma": {"osc.pe.q": 0.0}}, "a number > 0"), ({"sigma": {"osc.pe.q": np.nan}}, "a number > 0")],
 )  # fmt: skip
@@ -124,6 +156,6 @@ def test_options_that_would_change_nothing_or_have_no_meaning_are_refused(option
     data = {"t": [0.0, 0.5, 1.0], "osc.pe.q": [0.1, 0.0, -0.1]}
     run = {"initial": {"osc.pe.q": 0.1}, "step": 0.5, "max_evaluations": 2}
     with pytest.raises(ephs.OptionError, match=what):
-        ephs.fit(damped_oscillator(), data, ["osc.pe.k"], **run, **options)
+        ephs.fit(damped_oscillator(), data, ["osc.pe.k"], **(run | options))
     lawful = {"start": {"osc.pe.k": 1.0}, "bounds": {"osc.pe.k": (0.5, 2.0)}, "sigma": {"osc.pe.q": 1e-3}}
     assert 0.5 <= ephs.fit(damped_oscillator(), data, ["osc.pe.k"], **run, **lawful).values["osc.pe.k"] <= 2.0

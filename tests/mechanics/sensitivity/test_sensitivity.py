@@ -201,13 +201,40 @@ def test_a_friction_of_zero_has_a_derivative_from_above():
 
 
 @pytest.mark.parametrize("method", ["rk54", "natural"])
-@pytest.mark.parametrize(
-    ("text", "path"), [(WOUND, "joints.pin.pitch"), (WOUND.replace("1.25", "1.0"), "motors.m.resistance")]
-)
-def test_numbers_that_are_in_equations_and_in_no_table_are_refused(method, text, path):
-    """The pitch is in the code of the joint, and equations with a resistance of 1 have no product by it."""
-    with pytest.raises(ephs.OptionError, match=f"{path}.*leaves equations as they are"):
-        ephs.sensitivity(scene_of_text(text), [path], 0.1, method=method, step=0.02)
+def test_numbers_that_are_in_equations_and_in_no_table_are_refused(method):
+    """The pitch is in the code of the joint."""
+    with pytest.raises(ephs.OptionError, match=r"joints.pin.pitch.*leaves equations as they are"):
+        ephs.sensitivity(scene_of_text(WOUND), ["joints.pin.pitch"], 0.1, method=method, step=0.02)
+
+
+SIMPLER = {
+    "a product less": ["motors.m.resistance"],
+    "parts less": ["joints.pin.friction", "joints.pin.stiffness"],
+    "all at once": ["joints.pin.friction", "motors.m.resistance", "bodies.arm.mass"],
+}
+
+
+@pytest.mark.parametrize("method", ["rk54", "natural"])
+@pytest.mark.parametrize("name", SIMPLER)
+def test_numbers_by_which_equations_are_shorter_have_the_derivatives_of_those_beside_them(method, name):
+    """Zeros and ones, several at once and beside others: each as differences of runs by it alone."""
+    paths, scene = SIMPLER[name], scene_of_text(WOUND.replace("1.25", "1.0"))
+    run = {"method": method, "step": 0.02}
+    found = ephs.sensitivity(scene, paths, 0.1, **run)["joints.pin.rate"][-1, 0]
+    for path, slope_of in zip(paths, found, strict=True):
+        value, h = read(scene, path), 1e-3
+        at = (0.0, 1.0, 2.0, 3.0, 4.0) if not value else (-2.0, -1.0, 1.0, 2.0)
+        weights = np.array([-25.0, 48.0, -36.0, 16.0, -3.0] if not value else [1.0, -8.0, 8.0, -1.0]) / (12.0 * h)
+        ways = [ephs.simulate(varied(scene, {path: value + k * h}), 0.1, **run) for k in at]
+        expected = weights @ [way.joint("pin").rate[-1, 0] for way in ways]
+        assert slope_of == pytest.approx(expected, rel=1e-7), path
+
+
+def test_what_steps_made_is_not_known_of_a_motion_along_a_tangent():
+    """The least production of entropy in a step has no derivative."""
+    found = ephs.sensitivity(scene_of_text(WOUND), ["motors.m.resistance"], 0.1, method="rk54", step=0.02)
+    assert np.isnan(found["entropy_production"]).all() and np.isnan(found.solution.entropy_production).all()
+    assert np.isfinite(found["heat"]).all()
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 from concurrent.futures import CancelledError, Future
+from itertools import product
 
 import numpy as np
 import pytest
@@ -180,6 +181,16 @@ def test_a_system_of_no_bodies_by_its_closed_form():
     assert table["energy"].attrs["units"] == "J" and table["pe.q"].dims == ("pe.k", "t")
 
 
+def test_initial_values_of_a_system_are_varied_by_the_paths_of_its_states():
+    """A free oscillator from rest: q = a cos ωt, and twice that from twice the start."""
+    table = ephs.sweep(OSCILLATOR, {"pe.q": [0.5, 1.0], "pe.k": [1.0, 4.0]}, 1.0, save_at=[0.0, 0.5, 1.0], rtol=1e-9)
+    amplitudes, stiffness = table["initial.pe.q"].values, table["pe.k"].values
+    expected = amplitudes[:, None, None] * np.cos(
+        np.sqrt(stiffness / read(OSCILLATOR, "ke.m"))[:, None] * table.t.values
+    )
+    np.testing.assert_allclose(table["pe.q"].values, expected, rtol=0.0, atol=1e-7)
+
+
 @pytest.mark.parametrize("method", ["natural", "variational", "radau", "auto"])
 def test_every_kind_of_method_and_of_output(method):
     scene = ephs.load(SCENES / "slider-crank.toml")
@@ -211,6 +222,8 @@ def test_members_that_fail_are_kept_with_their_reasons():
     assert np.isnan(table["joints.j0.coordinate"].values[1]).all()
     assert np.isfinite(table["joints.j0.coordinate"].values[[0, 2, 3]]).all()
     few = ephs.sweep(scene, {"joints.j0.rate": [0.0, 1.0, 2.0]}, 1.0, save_at=[1.0], max_steps=2)
+    none = ephs.sweep(scene, {"bodies.rod1.mass": [-1.0, -2.0]}, 0.1, save_at=[0.1], outputs=["bodies.rod1.position"])
+    assert none["bodies.rod1.position"].shape == (2, 1, 3) and list(none["axis"].values) == ["x", "y", "z"]
     assert few.attrs["failed"] == 3 and "more steps than are allowed" in str(few.status.values[0])
 
 
@@ -298,6 +311,12 @@ def test_what_a_cluster_forgets_is_asked_for_again(monkeypatch):
         ({"bodies.rod1.mass": [1.0]}, {"outputs": ["enrgy"]}, 'did you mean "energy"'),
         ({"bodies.rod1.mass": [1.0]}, {"stepp": 0.1}, "no such option"),
         ({"bodies.rod1.mass": [1.0]}, {"save_at": [2.0]}, "save_at"),
+        ({"bodies.rod1.mass": [1.0]}, {"save_at": []}, "at least one time"),
+        ({"bodies.rod1.mass": [1.0]}, {"t0": 0.1}, "until is 0.1, expected a finite time other"),
+        ({"bodies.rod1.mass": [1.0]}, {"outputs": "heat"}, "as a list"),
+        ({"bodies.rod1.mass": [1.0]}, {"outputs": [None]}, "the name of an output"),
+        ({1: [1.0]}, {}, "a path and its values"),
+        *(({"bodies.rod1.mass": [1.0]}, {"workers": n}, "workers.*a whole number > 0") for n in (0, -1, 1.5, "2")),
     ],
 )
 def test_wrong_questions_are_refused(vary, more, says):
@@ -341,8 +360,19 @@ def test_the_command_says_how_to_vary(entry, tmp_path, capsys):
     assert "expected PATH=FROM:TO:COUNT" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("option", ["--until", "--rtol", "--atol", "--step"])
-@pytest.mark.parametrize("value", ["0", "-1", "inf", "nan"])
+def test_the_command_refuses_values_of_a_path_that_are_given_twice(tmp_path, capsys):
+    words = ["sweep", str(CHAIN), "--vary", "bodies.rod1.mass=1", "--vary", "bodies.rod1.mass=2", "--until", "1"]
+    assert main([*words, "-o", str(tmp_path)]) == 2
+    assert "bodies.rod1.mass: found twice" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        *product(["--until", "--rtol", "--atol", "--step"], ["0", "-1", "inf", "nan"]),
+        *product(["--instants", "--workers"], ["0", "-1"]),
+    ],
+)
 def test_the_command_refuses_what_is_not_positive(option, value, tmp_path, capsys):
     given = {"--until": "1", option: value}
     words = [word for pair in given.items() for word in pair]
