@@ -9,17 +9,17 @@ from tests.rooms import ROOT, SOURCES, size_of
 
 CEILINGS = {
     "ephs": 1_500,
-    "ephs/cli": 12_600,
-    "ephs/exporting": 13_600,
-    "ephs/mechanics": 424_800,
+    "ephs/cli": 12_700,
+    "ephs/exporting": 13_700,
+    "ephs/mechanics": 426_200,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
-    "ephs/semantics": 196_200,
+    "ephs/semantics": 196_300,
     "ephs/show": 64_400,
     "ephs/solve": 127_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 557_100,
+    "tests": 555_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

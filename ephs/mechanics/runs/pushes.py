@@ -87,15 +87,10 @@ def scene_signals(
     forces: dict[str, Signal] = {}
     wrenches: dict[str, Signal] = {}
     others: dict[Path, Signal] = {}
-<<<<<<< HEAD
     joints, markers = dict(scene.all_joints()), dict(scene.all_markers())
     bodies = {*dict(scene.all_bodies()), *nodes_of(scene)}
-    sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
-=======
-    joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
     sizes = {f"joints.{name}": j.dim for name, j in joints.items() if j.strain is None}  # beams have no ports within
     sizes |= {f"bodies.{name}": 6 for name in bodies}
->>>>>>> work-gases
     actuators = {f"actuators.{name}": each for name, each in scene.every("actuators")}
     sizes |= dict.fromkeys(actuators, 1)
     own = element_inputs(scene)

@@ -26,7 +26,7 @@ from ephs.mechanics.scene.registry import REGISTERED
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
-from ephs.semantics.primitives.primitives import Storage
+from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.semantics.systems.system import Filling, System
 from ephs.solve.posing.errors import no_model
 
@@ -215,7 +215,7 @@ def _library() -> dict[str, Callable[..., Filling]]:
     return {name: getattr(library, name) for name in library.__all__}
 
 
-def _numbers(filling: Filling) -> dict[str, float]:
+def _numbers(filling: Primitive) -> dict[str, float]:
     """Parameters of a library component that are numbers: not a reaction's equation."""
     entries: tuple[tuple[str, Any], ...] = filling.parameters if filling.name in _library() else ()
     return {key: float(value) for key, value in entries if isinstance(value, Real)}
@@ -235,7 +235,7 @@ def _start(system: System, path: str) -> tuple[Path, Array, int] | None:
     return state, values, entries[0]
 
 
-def _component(system: System, path: str) -> tuple[Filling, str, float]:
+def _component(system: System, path: str) -> tuple[Primitive, str, float]:
     """The component at a path, the parameter's name and its value."""
     box, _, key = path.rpartition(".")
     found = next((filling for at, filling in system.leaves() if str(at) == box), None)
