@@ -11,7 +11,7 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_700,
     "ephs/exporting": 13_700,
-    "ephs/mechanics": 426_200,
+    "ephs/mechanics": 426_300,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
     "ephs/semantics": 196_300,
@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 127_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 555_700,
+    "tests": 555_900,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

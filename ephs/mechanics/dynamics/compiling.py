@@ -55,7 +55,12 @@ def dynamics(
     for name, value in (inputs or {}).items():
         if callable(value) or isinstance(value, Sampled):
             raise OptionError(f"inputs[{name!r}]", value, "a number or numbers: dynamics have no time")
-    blown = {f"shells.{name}" for name, sheet in scene.all_shells() if sheet.pressure is not None}
+    sheets = {f"shells.{name}": sheet for name, sheet in scene.all_shells() if sheet.pressure is not None}
+    blown, markers = sheets.keys(), dict(scene.all_markers())
+    pressed = {f"bodies.{sheet.node(i)}" for sheet in sheets.values() for i in sheet.moving()}
+    pressed |= {f"markers.{name}" for name, marker in markers.items() if f"bodies.{marker.body}" in pressed}
+    if at := next((name for name in inputs or {} if name in pressed), None):
+        raise OptionError(f"inputs[{at!r}]", "a node of a sheet with a pressure", "a [loads] table in its place")
     pressures = {f"{name}.pressure": value for name, value in (inputs or {}).items() if name in blown}
     others = {name: value for name, value in (inputs or {}).items() if name not in blown}
     return Dynamics(problem_of_scene(varied(scene, pressures) if pressures else scene, None, others))

@@ -84,15 +84,14 @@ class Loading:
         self._loads: dict[str, list[Load]] = {}
         for _, load in () if scene is None else scene.all_loads():
             self._loads.setdefault(load.body, []).append(load)
-        self._surfaces = [
-            PressedSurface(equations, sheet)
-            for _, sheet in (() if scene is None else scene.all_shells())
-            if sheet.pressure is not None
-        ]
+        sheets = [] if scene is None else [sheet for _, sheet in scene.all_shells() if sheet.pressure is not None]
+        self._surfaces = [PressedSurface(equations, sheet) for sheet in sheets]
+        self._pressed = {sheet.node(i) for sheet in sheets for i in sheet.moving()}
         self._constant, signals = equations.wrench.copy(), equations.problem.signals
         names = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
         ported = [name for name in names if wrench_port(name) in signals]
-        self._turning = {name: of for name in ported if not (of := signals[wrench_port(name)]).constant}
+        turning = [name for name in ported if not signals[wrench_port(name)].constant and name not in self._pressed]
+        self._turning = {name: signals[wrench_port(name)] for name in turning}
         self._pushed = {name: names[name] for name in ported if name in self._turning or name in self._loads}
 
     def __bool__(self) -> bool:
@@ -135,6 +134,8 @@ class Loading:
         """(6,) loads and inputs after ramps on a body that is displaced by a pose (7,) in its frame."""
         pose, more = SE3.compose(self._equations.dense.residual.pose(self._pushed[name]), by), self.share - 1.0
         whole = self._constant[self._pushed[name]]
+        if name in self._pressed:  # whose signal is that of the surface, too
+            whole, more = np.zeros(6), self.share
         if name in self._turning:
             assert self._scene is not None
             whole = self._turning[name].at(np.inf, {body_box(self._scene, name) / "pe" / "q": pose})

@@ -147,15 +147,6 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         return True
 
     @rule(
-        "edges", at="", placed=True, found="a body {taken}, as its node is called", expected="another name of the body",
-        advice="rename one of the two",
-    )  # fmt: skip
-    def apart(self, site: Site) -> Told:
-        """Whether its nodes have names of their own."""
-        taken = next((name for i in self.free() if (name := self.node(i)) in site.scene.bodies), None)
-        return taken is None or {"taken": taken}
-
-    @rule(
         "edges", at="{at}", placed=True, found="{found}", expected="a node of the beam at each point of the side",
         advice="give both the same number of elements between the same points",
     )  # fmt: skip

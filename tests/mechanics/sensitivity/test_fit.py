@@ -101,7 +101,7 @@ def test_what_a_record_does_not_tell_has_no_error_bound():
     assert all(np.isinf(error) for error in found.errors.values())
 
 
-@pytest.mark.parametrize("size", [1e-12, 1e-7, 1.0, 1e6])
+@pytest.mark.parametrize("size", [1e-12, 1e6])
 def test_a_record_of_any_size_gives_the_same(size):
     """The oscillator is linear: its numbers do not depend on the unit of its displacement."""
     run = {"step": 0.05, "initial": {"osc.pe.q": size}}

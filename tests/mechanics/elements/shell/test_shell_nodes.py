@@ -101,6 +101,19 @@ def test_nodes_that_are_not_there_or_do_not_move_by_themselves_are_refused_by_na
     assert told in str(error.value)
 
 
+def test_a_sheet_with_a_pressure_rests_under_a_load_at_a_node():
+    keys = 'pressure = 0.3\ndamping = 0.5\nedges = ["free", "free", "free", "ground"]\n'
+    rest = ephs.equilibrium(
+        scene_of_text(FREE + keys + ACTING["a load"][0].replace("0.3, -0.2, 0.5", "1e-3, 0.0, 1e-2"))
+    )
+    run = ephs.simulate(rest.model, 0.1, method="radau", rtol=1e-8)
+    assert np.abs(run.shell("skin").position - run.shell("skin").position[0]).max() < 1e-12
+    still = rest.model.shells["skin"].shell().points
+    assert np.abs(run.shell("skin").position[0] - still).max() > 1e-3, "the control"
+    with pytest.raises(ephs.OptionError, match="a node of a sheet with a pressure"):
+        ephs.dynamics(rest.model, inputs={"bodies.skin.3": np.zeros(6)})
+
+
 def test_joints_hold_bodies_alone():
     with pytest.raises(SceneError, match=r"joints.pin.bodies\[1\]"):
         scene_of_text(f'{FREE}[joints.pin]\ntype = "spherical"\nbodies = ["ground", "skin.0"]\nat = [0.0, 0.0, 0.0]\n')
