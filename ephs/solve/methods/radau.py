@@ -336,8 +336,7 @@ class Radau:
             parts[:] = np.abs(h * scheme.coefficients @ change[:, :rates]) / allowed
             moved = float(np.max(parts, initial=0.0))
             stalls, before = tries > 2 and moved > 0.3 * before, moved
-            left = parts.max(axis=0, initial=0.0) > ENOUGH
-            rounded = stalls and not np.any(self._unrounded(state, h, stages, change) & left)
+            rounded = stalls and not np.any(self._unrounded(state, h, stages, change) & (parts > ENOUGH))
             if np.isfinite(moved) and (self.equations.linear or rounded):
                 return 0.0  # one iteration solves what is linear, and rounding is no change
             return moved
@@ -349,7 +348,7 @@ class Radau:
         path = self.model.state_path(worst_entry(parts.max(axis=0)))
         raise SolveError(Outcome.DIVERGED, path, "its rate at the stages")
 
-    def _unrounded(self, state: RadauState, h: float, stages: Array, change: Array) -> Array:
+    def _unrounded(self, state: RadauState, h: float, stages: Array, change: Array) -> Any:
         """(states,) where more than rounding, of the equations' terms and of the numbers' sums, changes rates so much.
 
         A factor of 10 covers what the signs of the terms may cancel here.
