@@ -171,7 +171,7 @@ def fit(
         covariance=covariance,
         residuals=record.residuals(last.solution),
         deviation=deviation,
-        model=_with(model, values),
+        model=varied(model, values, strict=False),
         solution=last.solution,
         iterations=runs.count,
         converged=bool(found.success),
@@ -255,7 +255,7 @@ class _FitRuns:
         """The motion and its tangents."""
         if self._last is None or not np.array_equal(self._last[0], x):
             values = dict(zip(self.paths, (x * self.scale).tolist(), strict=True))
-            model, until = _with(self.model, values), float(self.record.t[-1])
+            model, until = varied(self.model, values, strict=False), float(self.record.t[-1])
             self._last = np.array(x), sensitivity(model, self.paths, until, save_at=self.record.t, **self.run)
             self.count += 1
         return self._last[1]
@@ -281,10 +281,6 @@ def _covariance(jacobian: Array, deviation: float) -> tuple[Array, Array]:
     lost = np.abs(vt[~seen]).max(axis=0, initial=0.0) > NEIGHBOUR
     covariance[lost, lost] = np.inf
     return covariance, np.sqrt(np.diag(covariance))
-
-
-def _with(model: System | Scene, values: Mapping[str, float]) -> System | Scene:
-    return varied(model, values, strict=False)
 
 
 def _bounds(model: System | Scene, path: str) -> tuple[float, float]:
