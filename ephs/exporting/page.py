@@ -14,7 +14,7 @@ from ephs.exporting.image import ImageNumber, image_of
 from ephs.exporting.linking import webassembly
 from ephs.exporting.module import exported
 from ephs.mechanics.runs.simulate import simulate
-from ephs.mechanics.scene.build import component_path, nodes_of
+from ephs.mechanics.scene.build import component_path, node_boxes
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import names, read
 from ephs.show.motions.player import player
@@ -56,7 +56,7 @@ def live_page(
     times = np.linspace(0.0, until, round(FRAMES * until) + 1)
     solution = simulate(scene, until, method="rk87", save_at=times, audit="off")
     stage = stage_of(solution, fps=FRAMES, duration=until)
-    places, nodes = {each.name: each.place for each in made.outputs}, nodes_of(scene)
+    places, nodes = {each.name: each.place for each in made.outputs}, node_boxes(scene)
     scalar = [each for each in made.outputs if each.name.endswith(".coordinate")][:CURVES]
     curves = [
         {"name": each.name, "at": each.place, "panel": "coordinates [rad, m]", "colour": CYCLE[k % len(CYCLE)]}

@@ -9,8 +9,9 @@ from ephs.mechanics.dynamics.links import PlacedLinks
 from ephs.mechanics.dynamics.opening import HardContacts
 from ephs.mechanics.dynamics.results import Derivatives
 from ephs.mechanics.elements.shell.pressure import area_slopes, node_areas
-from ephs.mechanics.scene.build import body_box, wrench_port
+from ephs.mechanics.scene.build import wrench_port
 from ephs.mechanics.scene.loads import Load
+from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.shells import ShellSheet
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
@@ -80,7 +81,7 @@ class Loading:
     def __init__(self, equations: ReducedEquations, links: PlacedLinks) -> None:
         self.share, self.hard = 1.0, HardContacts(equations)
         self._equations, self._links = equations, links
-        self._scene = scene = equations.problem.scene
+        scene: Scene | None = equations.problem.scene
         self._loads: dict[str, list[Load]] = {}
         for _, load in () if scene is None else scene.all_loads():
             self._loads.setdefault(load.body, []).append(load)
@@ -137,8 +138,8 @@ class Loading:
         if name in self._pressed:  # whose signal is that of the surface, too
             whole, more = np.zeros(6), self.share
         if name in self._turning:
-            assert self._scene is not None
-            whole = self._turning[name].at(np.inf, {body_box(self._scene, name) / "pe" / "q": pose})
+            where = self._equations.reduced.places[self._pushed[name]].pose
+            whole = self._turning[name].at(np.inf, {} if where is None else {where.path: pose})
         turn = quaternion_to_matrix(pose[:4])
         return whole + sum((more * load.wrench(turn) for load in self._loads.get(name, ())), np.zeros(6))
 

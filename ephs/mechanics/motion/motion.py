@@ -20,7 +20,7 @@ from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
 from ephs.mechanics.motion.readout import freedoms_of, summary, variables
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.motion.shells import ShellMotion, shell_motion, with_nodes
-from ephs.mechanics.scene.build import body_box, component_path, nodes_of
+from ephs.mechanics.scene.build import body_box, component_path, node_boxes
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.mechanics.tree.finding.tendons import length_errors
@@ -152,7 +152,7 @@ class SceneMotion:
         self._joints = dict(scene.all_joints())
         self._implicit = dict(scene.implicit_joints())
         self._couplings = {name: coupling_of(joint) for name, joint in self._joints.items()}
-        self._nodes = nodes_of(scene)
+        self._nodes = node_boxes(scene)
 
     @property
     def freedoms(self) -> Mapping[str, Labels]:

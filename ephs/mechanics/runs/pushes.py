@@ -10,7 +10,7 @@ from ephs.mechanics.elements.shell.pressure import node_areas
 from ephs.mechanics.motion.batch import rotations
 from ephs.mechanics.runs.signals import View, signal
 from ephs.mechanics.scene.actuators import Actuator
-from ephs.mechanics.scene.build import body_box, component_path, element_inputs, nodes_of, tension_port
+from ephs.mechanics.scene.build import body_box, component_path, element_inputs, node_boxes, tension_port
 from ephs.mechanics.scene.element import GROUND
 from ephs.mechanics.scene.loads import Load
 from ephs.mechanics.scene.markers import Marker
@@ -88,7 +88,7 @@ def scene_signals(
     wrenches: dict[str, Signal] = {}
     others: dict[Path, Signal] = {}
     joints, markers = dict(scene.all_joints()), dict(scene.all_markers())
-    bodies = {*dict(scene.all_bodies()), *nodes_of(scene)}
+    bodies = {*dict(scene.all_bodies()), *node_boxes(scene)}
     sizes = {f"joints.{name}": j.dim for name, j in joints.items() if j.strain is None}  # beams have no ports within
     sizes |= {f"bodies.{name}": 6 for name in bodies}
     actuators = {f"actuators.{name}": each for name, each in scene.every("actuators")}

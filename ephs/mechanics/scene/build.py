@@ -40,7 +40,7 @@ def component_path(kind: str, name: str) -> Path:
     return Path([*(word for part in parts for word in ("parts", part)), kind, last])
 
 
-def nodes_of(scene: Scene) -> Mapping[str, Path]:
+def node_boxes(scene: Scene) -> Mapping[str, Path]:
     """Boxes of the nodes of its shells that are welded to nothing, by their names; made once, kept with the scene."""
 
     def made() -> dict[str, Path]:
@@ -55,7 +55,7 @@ def nodes_of(scene: Scene) -> Mapping[str, Path]:
 
 def body_box(scene: Scene, name: str) -> Path:
     """Box of a (dotted) body, or of a node of a shell."""
-    return nodes_of(scene).get(name) or component_path("bodies", name)
+    return node_boxes(scene).get(name) or component_path("bodies", name)
 
 
 def wrench_port(body: str) -> Path:
@@ -200,7 +200,7 @@ def scene_names(scene: Scene) -> dict[Path, str]:
 
 def _scene_names(scene: Scene) -> dict[Path, str]:
     out: dict[Path, str] = {component_path("bodies", name): name for name, _ in scene.all_bodies()}
-    out |= {box: name for name, box in nodes_of(scene).items()}
+    out |= {box: name for name, box in node_boxes(scene).items()}
     out |= {component_path("springs", name): name for name, _ in scene.all_springs()}
     for name, c in scene.all_contacts():
         points = range(len(contact_points(scene, c)))
