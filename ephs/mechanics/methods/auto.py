@@ -1,7 +1,7 @@
 """Automatic choice of the method: one without damping until stability limits the steps, then radau.
 
 Where surfaces may touch, the choice depends on the tolerance. Coarse tolerances have semi-implicit steps, since losses
-alone limit explicit steps there. At fine tolerances the methods compete (`ephs.mechanics.methods.contest`), since a
+alone limit explicit steps there. At finer tolerances the methods compete (`ephs.mechanics.methods.contest`), since a
 contact is stiff only while it is closed.
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
@@ -39,12 +39,16 @@ TRIAL = 400
 """Steps of rk54 between surfaces that may touch, after which others are tried: a stop at slip 0 hides its stiffness."""
 ITERATIONS, MATRICES = 4, 32
 """Iterations that a step of radau takes, about, and what its derivatives cost."""
-CHANGE = 8000
+BEGINS = {"semi": 6000, "radau": 18000}
+"""Evaluations of a single freedom that take as long as it takes to prepare the first steps of a method, about."""
+CHANGE = 600
 """Evaluations of a single freedom that take as long as it takes to go to another method and back, about."""
 LOOSE = 1e-2
 """Tolerances above this are for radau where surfaces may touch: explicit steps may gain more than is mended."""
 COARSE = 3e-4
 """Tolerances above this are for semi-implicit steps where surfaces may touch, where these serve."""
+HALFWAY = 5e-5
+"""Tolerances above this have a contest that semi-implicit steps begin, those below it one that explicit steps begin."""
 DIGITS = 1e-5
 """Tolerances below this are for order 8."""
 
@@ -80,15 +84,19 @@ class Auto(ReducedMethod):
         if self.control.rtol.value > LOOSE:
             self._take("radau")
             return
-        self._take(self._explicit.name)
         stages, n = self._explicit.method.c.size, self.equations.n
         count = scheme_of(self.equations, self.control).nodes.size
         factors, solutions = costs(n, count)
-        radau = ITERATIONS * (count + solutions) + factors + MATRICES
-        self._names = [self._explicit.name, *([SEMI] if serves else []), "radau"]
-        prices = [stages, *([LAGGED + 3] if serves else []), radau]
-        wakes = TRIAL * stages if self._explicit.name == "rk54" else np.inf
-        self._contest = Contest(prices, CHANGE / max(n, 1), wakes)
+        prices = {self._explicit.name: stages}
+        if serves:
+            prices[SEMI] = LAGGED + 3
+        prices["radau"] = ITERATIONS * (count + solutions) + factors + MATRICES
+        first = SEMI if serves and self.control.rtol.value > HALFWAY else self._explicit.name
+        self._take(self._explicit.name)  # for single steps
+        self._names = sorted(prices, key=lambda name: name != first)
+        starts = [BEGINS.get(name, 0) / max(n, 1) for name in self._names]
+        wakes = {"rk54": TRIAL * stages, SEMI: 0.0}.get(first, np.inf)
+        self._contest = Contest([prices[name] for name in self._names], starts, CHANGE / max(n, 1), wakes)
 
     def _take(self, name: str) -> None:
         """Let a method take the steps that follow."""
@@ -139,6 +147,8 @@ class Auto(ReducedMethod):
         contest = self._contest
         if contest is not None:
             self._take(self._names[contest.at])
+            if not self.counts["switches"]:
+                self.name = self.counts["chosen"] = self._names[contest.home]
         left = self._switch if contest is None else self._moved
         if not isinstance(self._active, Explicit):
             return self._active.many(span, contest, left)

@@ -21,7 +21,7 @@ WINDOW: Final = 12
 """Steps whose cost per second of motion counts, rejected ones included."""
 GROWN: Final = 1.5
 """Growth of the rate after which other methods are tried early."""
-PART, EARLY, FIRST = 0.08, 0.25, 1.0
+PART, EARLY, FIRST = 0.08, 0.25, 0.2
 """Part of the cost since a method's last try that tries may have: usually, where the rate has grown, at first."""
 GAIN: Final = 0.9
 """Part of the present rate from which on another method stays."""
@@ -35,6 +35,8 @@ class Contest(Resumable):
     ----------
     prices
         What a step of each method will cost, about, in evaluations.
+    starts
+        What its first steps cost besides.
     change
         What it costs to go to another method and back, besides steps.
     wakes
@@ -55,9 +57,9 @@ class Contest(Resumable):
         "_awake", "_settling", "_spent", "_price", "_least", "_rates", "_tried", "_due",
     )  # fmt: skip
 
-    def __init__(self, prices: Sequence[float], change: float, wakes: float = np.inf) -> None:
+    def __init__(self, prices: Sequence[float], starts: Sequence[float], change: float, wakes: float = np.inf) -> None:
         self._change, self._wakes = change, wakes
-        self.prices = [(SETTLING + WINDOW) * price + change for price in prices]
+        self.prices = [(SETTLING + WINDOW) * a + b + change for a, b in zip(prices, starts, strict=True)]
         self.home = self.at = self.tries = 0
         self._awake, self._settling = False, True
         self._spent = self._price = 0.0

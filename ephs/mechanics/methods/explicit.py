@@ -93,6 +93,7 @@ class Explicit(ReducedMethod):
         super().__init__(equations, control)
         self.solve = equations.stages if lagged is None else lagged.stages
         self.lagged = lagged
+        self._march: March | None = None
         self.method, self.name, self.exponent = method, method.name, method.exponent
         self.share, self._worth = (0.5, WORTH) if lagged is None else (0.0, WHOLE)
         compiled = STEPS.compiled()
@@ -168,4 +169,6 @@ class Explicit(ReducedMethod):
         """
         if not self.equations.constant:
             return None
-        return March(self, self.method.arrays, span, limit, left, contest=contest, lagged=self.lagged)
+        if self._march is None or not self._march.serves(span):
+            self._march = March(self, self.method.arrays, span, lagged=self.lagged)
+        return self._march.of(span, limit, left, contest)

@@ -40,19 +40,16 @@ Leave = Callable[[float, float, str], None]
 
 @final
 class March:
-    """One run in compiled steps. Times in it are counted from the start and grow.
+    """One run in compiled steps, or the parts of it that `of` begins. Times in it are counted from the start and grow.
 
     Parameters
     ----------
     arrays
         Coefficients, by the names of `ephs.solve.march.Tableau`.
-    limit, left
-        Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look. In a
-        contest it calls ``left`` where another method wins.
+    span
+        The run, or the first of these parts.
     kept
         The matrix of implicit steps, and memory for these; None: steps are explicit or iterated.
-    contest
-        It weighs the steps, window by window, and tells where another method takes those that follow.
     lagged
         Memory of semi-implicit steps.
 
@@ -69,19 +66,13 @@ class March:
         method: ReducedMethod,
         arrays: Mapping[str, Any],
         span: Span[ReducedState],
-        limit: float = 0.0,
-        left: Leave | None = None,
         kept: KeptJacobian | None = None,
-        contest: Contest | None = None,
         lagged: "Semi | None" = None,
     ) -> None:
         eq, start = method.equations, method.equations.accounts.opened(span.state)
-        self.own, eq.accounts.kept = eq.accounts.own, True
+        self.own, self.method, self.span = eq.accounts.own, method, span
         summed = start.account.size - self.own
-        self.method, self.span, self.left, self._leave = method, span, False, left
-        self._handed, self._kept, self._look = 0, kept, float(LOOKED)
-        self._contest, self._lagged = contest, lagged is not None
-        self._weighed = np.zeros(3)  # where the window began: tries, cost in evaluations, time
+        self._kept, self._lagged = kept, lagged is not None
         size, q, times = eq.size, span.state.q, span.save_at
         rows = ROWS if times is None else max(times.size, 1)
         self.times = np.zeros(0) if times is None else np.abs(times - span.t0)
@@ -90,19 +81,14 @@ class March:
             "k": (stages, size), "q1": (q.size,), "y1": (size,), "q2": (q.size,), "y2": (size,), "k2": (stages, size),
             "last": (size,), "allowed": (counted,), "open": (eq.n,), "fine": (counted,), "coarse": (counted,),
             "rows_t": (rows, 4), "rows_q": (rows, q.size), "rows_y": (rows, size - eq.nv),
-            **dict.fromkeys(("carry1", "carry2", "change", "size"), (summed,)),
+            "q": (q.size,), "y": (size,), **dict.fromkeys(("carry", "carry1", "carry2", "change", "size"), (summed,)),
             **dict.fromkeys(("whole", "low"), (2 * summed,)),
         }  # fmt: skip
         self.memory = {name: np.zeros(shape) for name, shape in shapes.items()} | {
-            "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
-            "times": self.times, "carry": start.account[self.own :].copy(),
+            "atol": np.array(method.atol), "rtol": np.array(method.rtol), "times": self.times,
         }  # fmt: skip
         self.steering, self.account = MarchControl.table(1), RunAccount.table(1)
         self.control: Any = self.steering[0]
-        a: Any = self.account[0]
-        (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
-        a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.totals.any()))
-        a.alone = int(kept is not None and span.policy is None)  # constant implicit steps may not resolve fast modes
         given = arrays, self.memory, self.steering, self.account
         if lagged is not None:
             self.march = eq.engine.lagged("march", lagged.onsager, *given, lagged.memory, 0)
@@ -110,6 +96,44 @@ class March:
             self.march = eq.engine.implicit(*given, kept.memory, 0)
         else:
             self.march = eq.engine.bind("march", *given, 0)
+
+    def serves(self, span: Span[ReducedState]) -> bool:
+        """Whether `of` may begin a span, with the same instants to keep."""
+        return span.save_at is self.span.save_at and span.t0 == self.span.t0
+
+    def of(
+        self,
+        span: Span[ReducedState],
+        limit: float = 0.0,
+        left: Leave | None = None,
+        contest: Contest | None = None,
+    ) -> "March":
+        """The same, at the begin of a span.
+
+        Parameters
+        ----------
+        limit, left
+            Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look.
+            In a contest it calls ``left`` where another method wins.
+        contest
+            It weighs the steps, window by window, and tells where another method takes those that follow.
+        """
+        eq, start, method = self.method.equations, self.method.equations.accounts.opened(span.state), self.method
+        eq.accounts.kept = True
+        self.span, self.left, self._leave, self._contest = span, False, left, contest
+        self._handed, self._look = 0, float(LOOKED)
+        self._weighed = np.zeros(3)  # where the window began: tries, cost in evaluations, time
+        for array in (*self.steering.arrays, *self.account.arrays):
+            array[:] = 0
+        if self._kept is not None:
+            self._kept.begin()
+        s, times = self.memory, span.save_at
+        s["q"][:], s["y"][:], s["carry"][:] = span.state.q, eq.vector(span.state), start.account[self.own :]
+        a: Any = self.account[0]
+        (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
+        a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.totals.any()))
+        # constant implicit steps may not resolve fast modes
+        a.alone = int(self._kept is not None and span.policy is None)
         c, policy, control = self.control, span.policy, span.control
         c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
         c.step, c.least_step, c.most_step = span.h, control.least, control.most
@@ -120,6 +144,7 @@ class March:
         c.saved = -1 if times is None else span.saved
         c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
         self._weighed[:] = self._tries, self._cost, c.time
+        return self
 
     @property
     def explicit(self) -> bool:

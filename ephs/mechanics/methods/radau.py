@@ -52,6 +52,7 @@ class Implicit(ReducedMethod):
         self.counts = self.counts if counts is None else counts
         self.scheme = scheme or scheme_of(equations, control)
         self._fewer: Implicit | None = None
+        self._march: March | None = None
         self.exponent = self.scheme.nodes.size + 1.0
         self._embedded = self.scheme.defect @ np.linalg.inv(self.scheme.coefficients) / self.scheme.gamma
         self._stages, self._tableau = Stages(equations, control, self.scheme, self.counts), tableau(self.scheme)
@@ -104,7 +105,9 @@ class Implicit(ReducedMethod):
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
         if looped or attached or not eq.constant or self._stages.jacobian.sparse:
             return None
-        return March(self, self._tableau, span, left=left, kept=KeptJacobian(self._stages), contest=contest)
+        if self._march is None or not self._march.serves(span):
+            self._march = March(self, self._tableau, span, kept=KeptJacobian(self._stages))
+        return self._march.of(span, left=left, contest=contest)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised, of fewer stages, too."""

@@ -190,8 +190,6 @@ class KeptJacobian:
         out = np.ascontiguousarray(_parts(scheme.back.T, -1.0).T)
         count, systems = scheme.nodes.size, len(scheme.values)
         self.newton = Newton.table(1)
-        n: Any = self.newton[0]
-        n.enough, n.rough, n.stale, n.pairs = stages.enough_kept, stages.rough, 1, systems - 1
         shapes: dict[str, tuple[int, ...]] = {
             "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "factors": (count * m, m),
             "right": (2 * eq.n,), "y": (eq.size,), "rate": (eq.size,), "q": (eq.reduced.coordinates,), "part": (count,),
@@ -202,6 +200,13 @@ class KeptJacobian:
             "values": _parts(1.0 / np.array(scheme.values)[:, None], 1.0).ravel(),
             **{name: np.zeros(systems * m, dtype=np.int64) for name in PIVOTING},
         }  # fmt: skip
+
+    def begin(self) -> None:
+        """Forget the matrix, for the first step of a part of a run."""
+        for array in self.newton.arrays:
+            array[:] = 0
+        n, stages = self.newton[0], self._stages
+        n.enough, n.rough, n.stale, n.pairs = stages.enough_kept, stages.rough, 1, len(stages.scheme.values) - 1
 
     def renew(self, state: ReducedState) -> None:
         """Make the matrix that of a state.
