@@ -171,4 +171,4 @@ class Explicit(ReducedMethod):
             return None
         if self._march is None or not self._march.serves(span):
             self._march = March(self, self.method.arrays, span, lagged=self.lagged)
-        return self._march.of(span, limit, left, contest)
+        return self._march.leg(span, limit, left, contest)

@@ -40,14 +40,14 @@ Leave = Callable[[float, float, str], None]
 
 @final
 class March:
-    """One run in compiled steps, or the parts of it that `of` begins. Times in it are counted from the start and grow.
+    """One run in compiled steps, or the legs of it that `leg` begins. Times in it are counted from the start and grow.
 
     Parameters
     ----------
     arrays
         Coefficients, by the names of `ephs.solve.march.Tableau`.
     span
-        The run, or the first of these parts.
+        The run, or its first leg.
     kept
         The matrix of implicit steps, and memory for these; None: steps are explicit or iterated.
     lagged
@@ -98,17 +98,17 @@ class March:
             self.march = eq.engine.bind("march", *given, 0)
 
     def serves(self, span: Span[ReducedState]) -> bool:
-        """Whether `of` may begin a span, with the same instants to keep."""
+        """Whether it has a leg for a span: with the same instants to keep."""
         return span.save_at is self.span.save_at and span.t0 == self.span.t0
 
-    def of(
+    def leg(
         self,
         span: Span[ReducedState],
         limit: float = 0.0,
         left: Leave | None = None,
         contest: Contest | None = None,
     ) -> "March":
-        """The same, at the begin of a span.
+        """The same at the start of a span, as the leg of it.
 
         Parameters
         ----------

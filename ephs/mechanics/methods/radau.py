@@ -107,7 +107,7 @@ class Implicit(ReducedMethod):
             return None
         if self._march is None or not self._march.serves(span):
             self._march = March(self, self._tableau, span, kept=KeptJacobian(self._stages))
-        return self._march.of(span, left=left, contest=contest)
+        return self._march.leg(span, left=left, contest=contest)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised, of fewer stages, too."""

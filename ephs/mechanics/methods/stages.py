@@ -202,7 +202,7 @@ class KeptJacobian:
         }  # fmt: skip
 
     def begin(self) -> None:
-        """Forget the matrix, for the first step of a part of a run."""
+        """Forget the matrix, at the start of a leg."""
         for array in self.newton.arrays:
             array[:] = 0
         n, stages = self.newton[0], self._stages
