@@ -1,12 +1,15 @@
 """Paths: how boxes, junctions and ports are named, across all levels of nesting."""
 
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import TypeAlias, final
 
 from ephs.operad.errors import PatternError
 
 LONGEST_NAME = 200
 MOST_NAMES = 500
+KEPT = 1 << 13
+"""Dotted names whose paths are kept: the states of large scenes are named again in each run."""
 
 
 @final
@@ -44,6 +47,7 @@ class Path(tuple[str, ...]):
         return _trusted(parts)
 
     @staticmethod
+    @lru_cache(maxsize=KEPT)
     def parse(text: str) -> "Path":
         """Read a dotted path; ``"."`` is the root."""
         return ROOT if text == "." else Path(text.split("."))

@@ -23,7 +23,7 @@ from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.errors import SceneError, fault
 from ephs.mechanics.scene.meant import is_shaky
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.scene.state import Snapshot
+from ephs.mechanics.scene.state import scale_of
 from ephs.operad import Path
 from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Reference
@@ -108,12 +108,12 @@ def problem_of_scene(
         constraints=lambda: ConfiguredMechanism.of(scene),
         dependences=lambda: explain(scene),
         shaky=lambda: is_shaky(scene),
-        length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),
+        length=scale_of(scene).length,
         view=view,
         names=scene_names(scene),
     )
     if initial:
-        scale, mass = Snapshot.of(scene).scale(world.gravity), sum(body.mass for _, body in scene.all_bodies())
+        scale, mass = scale_of(scene), sum(body.mass for _, body in scene.all_bodies())
         turning = (mass or 1.0) * scale.rate * scale.length**2
         check_closed(problem, turning / np.array([1.0] * 3 + [scale.length] * 3), t0)
     return problem
