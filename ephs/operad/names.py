@@ -47,10 +47,9 @@ class Path(tuple[str, ...]):
         return _trusted(parts)
 
     @staticmethod
-    @lru_cache(maxsize=KEPT)
     def parse(text: str) -> "Path":
         """Read a dotted path; ``"."`` is the root."""
-        return ROOT if text == "." else Path(text.split("."))
+        return _parsed(text)
 
     @staticmethod
     def of(value: "PathLike") -> "Path":
@@ -104,6 +103,11 @@ class Path(tuple[str, ...]):
 
 PathLike: TypeAlias = "Path | str | tuple[str, ...]"
 """A path, a dotted name, or a tuple of names."""
+
+
+@lru_cache(maxsize=KEPT)
+def _parsed(text: str) -> Path:
+    return ROOT if text == "." else Path(text.split("."))
 
 
 def _trusted(parts: tuple[str, ...]) -> Path:

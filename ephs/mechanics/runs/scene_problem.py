@@ -10,7 +10,7 @@ from ephs.mechanics.constraints.redundancy import explain
 from ephs.mechanics.motion.motion import SceneMotion
 from ephs.mechanics.motion.views import view_of
 from ephs.mechanics.runs.assembling import check_closed
-from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
+from ephs.mechanics.runs.pushes import add_to, part_of, scene_signals
 from ephs.mechanics.scene.build import (
     drive_ports,
     initial_state,
@@ -91,7 +91,7 @@ def problem_of_scene(
                 raise AssemblyError(
                     "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
                 )
-            signals[port] = sum_of(signals[port], extra) if port in signals else extra
+            add_to(signals, port, extra)
     signals |= others
     signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
     world = scene.world

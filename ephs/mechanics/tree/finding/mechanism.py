@@ -176,7 +176,7 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
     place = {body: i for i, body in enumerate(order)} | {GROUND: GROUND}
     acting = tuple(WrenchPort(one.port, Frame(place[one.frame.link], one.frame.offset)) for one in parts.acting)
     stored = (*parts.entropies, *(state.path for state in parts.network.states))
-    attaching = attaching_of(slots, parts, edges, mechanism, stored, flows, model.reference)
+    attaching = attaching_of(slots, parts, edges[:count], mechanism, stored, flows, model.reference)
     unknowns = 2 * int(mechanism.driven.size) + int(mechanism.rows.sum()) + len(attaching.ties)
     spans = frozenset(range(count - len(parts.spans), count))
     return Reduced(
