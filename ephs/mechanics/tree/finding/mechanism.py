@@ -140,8 +140,7 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
 def _placed(problem: Problem) -> dict[Path | None, Array]:
     """Initial elements of joints and poses of links, by their states; none where tables do not depend on them."""
     parts = parts_of(problem)
-    flat = {edge.pair.name for edge in parts.joints if edge.pair.dim} <= {"revolute", "prismatic"}
-    if len(parts.joints) == len(parts.links) and not (parts.network.ties or flat):
+    if len(parts.joints) == len(parts.links) and not parts.network.ties:
         return {}
     states = [edge.state for edge in (*parts.joints, *parts.spans)]
     states += [link.pose.path for link in parts.links if link.pose is not None]
