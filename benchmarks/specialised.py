@@ -39,7 +39,7 @@ def measure(family: str, size: int) -> dict[str, Any]:
     """Seconds of an evaluation, and to compile, of both programs."""
     scene = families.scene(family, size)
     equations = ReducedEquations(problem_of_scene(scene), 0.0)
-    found = links_of(equations.reduced).packed(equations.gravity)
+    found = links_of(equations.reduced).packed(equations.reduced.gravity)
     looped = sweeps(found.kind)
     state, rng = equations.start(0.0), np.random.default_rng(0)
     q = np.array([state.q] * STATES)

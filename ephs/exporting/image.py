@@ -21,7 +21,6 @@ from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.tree.engine.heats import entropies
 from ephs.mechanics.tree.engine.states import Ends, Source, StorageRow, Walked, energies, rows
 from ephs.mechanics.tree.equations.equations import ReducedEquations
-from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.linear.dense import copy
@@ -352,11 +351,10 @@ def _outputs(eq: ReducedEquations, values: Array) -> list[ImageNumber]:
     def counted(name: str, size: int) -> list[str]:
         return [name if size == 1 else f"{name}.{k}" for k in range(size)]
 
-    for i, edge in enumerate(eq.reduced.edges):
+    for i, edge in enumerate(eq.reduced.joints):
         path, size = edge.path or edge.state or edge.name, edge.pair.size
-        if t.kind[i] != SPRING:  # elements that are rotations are no coordinates
-            turns = edge.pair.code in (codes.SO3, codes.SE3, codes.SO3xR3)
-            add_outputs(int(t.q_at[i]), path, POSE[:size] if turns else counted("coordinate", size))
+        turns = edge.pair.code in (codes.SO3, codes.SE3, codes.SO3xR3)  # rotations are no coordinates
+        add_outputs(int(t.q_at[i]), path, POSE[:size] if turns else counted("coordinate", size))
         if i < eq.reduced.links:
             add_outputs(eq.reduced.coordinates + int(t.r_at[i]), path, counted("rate", edge.pair.dim))
     first = eq.reduced.coordinates + eq.n

@@ -1,12 +1,15 @@
 """Paths: how boxes, junctions and ports are named, across all levels of nesting."""
 
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import TypeAlias, final
 
 from ephs.operad.errors import PatternError
 
 LONGEST_NAME = 200
 MOST_NAMES = 500
+KEPT = 1 << 13
+"""Dotted names whose paths are kept: the states of large scenes are named again in each run."""
 
 
 @final
@@ -46,7 +49,7 @@ class Path(tuple[str, ...]):
     @staticmethod
     def parse(text: str) -> "Path":
         """Read a dotted path; ``"."`` is the root."""
-        return ROOT if text == "." else Path(text.split("."))
+        return _parsed(text)
 
     @staticmethod
     def of(value: "PathLike") -> "Path":
@@ -100,6 +103,11 @@ class Path(tuple[str, ...]):
 
 PathLike: TypeAlias = "Path | str | tuple[str, ...]"
 """A path, a dotted name, or a tuple of names."""
+
+
+@lru_cache(maxsize=KEPT)
+def _parsed(text: str) -> Path:
+    return ROOT if text == "." else Path(text.split("."))
 
 
 def _trusted(parts: tuple[str, ...]) -> Path:

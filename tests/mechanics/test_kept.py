@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 import ephs
+from benchmarks.touching import boxes
 from ephs.mechanics.elements.joints import spring_damper
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.build import initial_state, scene_system
+from ephs.mechanics.scene.contacts import contact_points
+from ephs.mechanics.scene.site import Site
 from ephs.mechanics.scene.springs import Spring
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path, Pattern
@@ -116,6 +119,25 @@ def test_a_scene_in_another_state_has_the_digits_of_one_made_anew(seed):
     assert parts_of(moved) == parts_of(made_anew(moved))
     assert parts_of(moved) != parts_of(scene)
     assert scene_system(made_anew(moved)) is not scene_system(scene)
+
+
+def test_tables_are_made_once_for_all_states_of_a_tree():
+    """The control: where a loop closes, rows depend on where it stands."""
+    tree, loop = scene_of_text(BOUNCING), shipped("four-bar")
+    assert equations_of(later(tree)).reduced is equations_of(tree).reduced
+    assert equations_of(later(loop)).reduced is not equations_of(loop).reduced
+
+
+def test_poses_at_contacts_are_to_the_bit_those_of_one_point_alone():
+    scene = later(scene_of_text(boxes(2).scene))
+    start = initial_state(scene)
+    for name, contact in scene.contacts.items():
+        points = contact_points(scene, contact)
+        assert len(points) > 1
+        for i, point in enumerate(points):
+            (one, other), (first, second) = point.bodies, point.frames
+            alone = Site(scene, contact).between(one, first, other, second)
+            assert np.array_equal(start[Path(["contacts", name, f"point{i}", "pe", "q_r"])], alone)
 
 
 def test_a_part_that_was_heated_is_another_one(tmp_path):

@@ -27,7 +27,7 @@ class PlacedLinks:
 
     def weights(self) -> dict[str, float]:
         """Body -> its weight in N."""
-        places, size = self.equations.reduced.places, float(np.linalg.norm(self.equations.gravity))
+        places, size = self.equations.reduced.places, float(np.linalg.norm(self.equations.reduced.gravity))
         return {name: float(places[i].inertia[5, 5]) * size for name, i in self._number.items()}
 
     def place(self, q: Array, r: Array) -> None:

@@ -147,7 +147,7 @@ class Touching:
         accelerations (n,) of the tree's rates; one length a second where all vanish."""
         length = self._eq.problem.length
         _, pulls = self.motion(q, accelerations)
-        pull = max(float(np.linalg.norm(self._eq.gravity)), float(np.abs(pulls).max(initial=0.0)))
+        pull = max(float(np.linalg.norm(self._eq.reduced.gravity)), float(np.abs(pulls).max(initial=0.0)))
         return max(float(np.sqrt(pull * length)), float(np.abs(self.motion(q, r)[1]).max(initial=0.0))) or length
 
     def rows(self, q: Array, r: Array, which: Index, axes: Index | None = None) -> tuple[Array, Index]:

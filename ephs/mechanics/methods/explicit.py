@@ -5,7 +5,7 @@ Steps of a mechanism on which nothing but given constants acts are taken many in
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -16,6 +16,7 @@ from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.stage.calling import Bound
 from ephs.solve.march.account import WHOLE, WORTH
 from ephs.solve.march.steps import STEPS
 from ephs.solve.methods.own import Method, coefficients_of
@@ -96,12 +97,19 @@ class Explicit(ReducedMethod):
         self._march: March | None = None
         self.method, self.name, self.exponent = method, method.name, method.exponent
         self.share, self._worth = (0.5, WORTH) if lagged is None else (0.0, WHOLE)
-        compiled = STEPS.compiled()
         self._fine, self._coarse, self._allowed = np.zeros((3, self.atol.size))
         self._open, self._shut = np.zeros((2, equations.n))
-        self._measure = compiled["measure"].bind(self._fine, self._coarse, self._allowed, method.arrays["eighth"])
-        self._drift = compiled["drift"].bind(self._open, self._shut, self._allowed)
-        self._stiffness = compiled["stiffness"].bind(self._fine, self._coarse, self._allowed, 0.0)
+
+    @cached_property
+    def _weighing(self) -> tuple[Bound, Bound, Bound]:
+        """The measure of an error, that of what is projected, and stiffness, of steps that are taken one by one."""
+        compiled, ends = STEPS.compiled(), (self._fine, self._coarse, self._allowed)
+        drift = compiled["drift"].bind(self._open, self._shut, self._allowed)
+        return (
+            compiled["measure"].bind(*ends, self.method.arrays["eighth"]),
+            drift,
+            compiled["stiffness"].bind(*ends, 0.0),
+        )
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
@@ -109,7 +117,7 @@ class Explicit(ReducedMethod):
 
     def tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
         """One step, or a part of one."""
-        eq, scheme = self.equations, self.method.arrays
+        eq, scheme, (measure, drift, stiffness) = self.equations, self.method.arrays, self._weighing
         state = eq.accounts.opened(state)
         y0, y1 = eq.vector(state), np.empty(eq.size)
         k = np.zeros((scheme["a"].shape[0], eq.size))
@@ -124,11 +132,11 @@ class Explicit(ReducedMethod):
         closed = eq.closed(end)
         estimates = [eq.along(h * (weights @ k)[eq.counted]) for weights in self.method.estimates]
         self._fine[:], self._coarse[:] = estimates[0], estimates[-1]
-        error = float(self._measure())
+        error = float(measure())
         rough = any(q is state.q for q in self.rough)
         if eq.engine.looped and not (rough or eq.careful):
             self._open[:], self._shut[:] = end.r, closed.r
-            error = max(error, float(self._drift()))
+            error = max(error, float(drift()))
         if not error > 1.0 or self.control.step is not None:
             closed, missed = eq.accounts.corrected(
                 state, closed, h, allowed, chosen=self.control.step is None, share=self._worth
@@ -137,7 +145,7 @@ class Explicit(ReducedMethod):
         self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
         if self.lagged is None:
             self._fine[:], self._coarse[:] = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]
-            self.stiffness = float(self._stiffness(h))
+            self.stiffness = float(stiffness(h))
             if not (eq.engine.looped or eq.careful):  # nothing was projected: the last rates are the next first ones
                 first = k[-1].copy()
                 first[: eq.nv] = closed.r

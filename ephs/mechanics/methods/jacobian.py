@@ -8,7 +8,6 @@ from ephs.mechanics.tree.engine.apart import columns_of_trees, directions
 from ephs.mechanics.tree.engine.slopes import Call, RateSlopes, calls_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.tangent import Linearised
-from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.kept import once
@@ -107,8 +106,8 @@ class Jacobian:
         value[:, heat] /= warmth  # ds = dE/θ, and Ė = θ ṡ
         value[heat] *= warmth[:, None]
         value[heat, heat] += np.diag(found.out[found.entropy_rates] * eq.heats.slopes())
-        for i, edge in enumerate(eq.reduced.edges):
-            if tables.kind[i] != SPRING and tables.code[i] != VECTOR:  # v̇ = dexp⁻¹(v) r turns with v: r + ½ [v, r] + …
+        for i, edge in enumerate(eq.reduced.joints):
+            if tables.code[i] != VECTOR:  # v̇ = dexp⁻¹(v) r turns with v: r + ½ [v, r] + …
                 where = slice(int(tables.r_at[i]), int(tables.r_at[i] + tables.dim[i]))
                 value[where, where] -= 0.5 * edge.pair.manifold.ad(rates[where])
         return value

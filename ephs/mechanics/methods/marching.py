@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from ephs.mechanics.methods.semi import Semi
 
 ROWS = 1024
-"""Capacity of the buffer of rows."""
+"""Capacity of the buffers of rows."""
+BUFFERS = ("rows_t", "rows_q", "rows_y")
+"""These: only rows that were written are read, and no others come into memory."""
 LAGGED = 4
 """Evaluations that cost as much as the factors of the masses in a semi-implicit step."""
 FAILING = "its steps fail"
@@ -84,7 +86,8 @@ class March:
             "q": (q.size,), "y": (size,), **dict.fromkeys(("carry", "carry1", "carry2", "change", "size"), (summed,)),
             **dict.fromkeys(("whole", "low"), (2 * summed,)),
         }  # fmt: skip
-        self.memory = {name: np.zeros(shape) for name, shape in shapes.items()} | {
+        made = {name: (np.empty if name in BUFFERS else np.zeros)(shape) for name, shape in shapes.items()}
+        self.memory = made | {
             "atol": np.array(method.atol), "rtol": np.array(method.rtol), "times": self.times,
         }  # fmt: skip
         self.steering, self.account = MarchControl.table(1), RunAccount.table(1)

@@ -44,7 +44,7 @@ class ReducedMotion:
         self._solution, self._eq = solution, equations
         reduced, t = equations.reduced, equations.reduced.tables
         self._number = {edge.path: i for i, edge in enumerate(reduced.edges) if edge.path is not None}
-        inside = np.array(links_of(reduced, apart=True).bodies.inside).reshape(-1, 7)
+        inside = np.array(links_of(reduced, apart=True).inside).reshape(-1, 7)
         into = adjoint_inverse(inside)
         self._momenta = into.mT
         self._transmission = Transmission(reduced, inside, into.mT @ t.inertia @ into)
@@ -151,8 +151,8 @@ class ReducedMotion:
         prescribed = np.zeros((n, eq.n))
         prescribed[:, eq.driven] = [eq.prescribed.rates(time) for time in solution.t]
         q, momenta, own = np.zeros((n, reduced.coordinates)), *np.zeros((2, n, reduced.links, 6))
-        for i, edge in enumerate(reduced.edges):
-            if edge.state is not None and t.kind[i] != SPRING:
+        for i, edge in enumerate(reduced.joints):
+            if edge.state is not None:
                 given = solution[edge.state].reshape(n, -1)
                 if edge.path is not None and t.code[i] != VECTOR:  # relative poses are kept as coordinates
                     given = np.array([edge.pair.element(row) for row in given])

@@ -17,7 +17,7 @@ import numpy as np
 
 from ephs.mechanics.constraints.holding import annihilator
 from ephs.mechanics.tree.finding.mechanism import Reduced
-from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
+from ephs.mechanics.tree.finding.tables import CUT, TREE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
@@ -112,7 +112,7 @@ class Transmission:
             Forces on the degrees of freedom of all joints.
         """
         reduced, t = self._reduced, self._reduced.tables
-        frames = {i: self._second(i, places) for i in range(len(reduced.edges)) if t.kind[i] != SPRING}
+        frames = {i: self._second(i, places) for i in range(len(reduced.joints))}
         freedoms = self._freedoms(frames)
         needed = self._needed(places, accelerations, freedoms, pushed)
         if not self._cut:

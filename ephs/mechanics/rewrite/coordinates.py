@@ -16,7 +16,7 @@ from ephs.mechanics.rewrite.rewrite import Strength
 from ephs.mechanics.rewrite.steps import Step, listed
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.finding.mechanism import Reduced, reduce_system
-from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
+from ephs.mechanics.tree.finding.tables import CUT, TREE
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
@@ -104,7 +104,7 @@ def mechanisms(reduced: Reduced) -> tuple[ConnectedBodies, ...]:
     for root in sorted(set(leaders)):
         links = frozenset(link for link, leader in enumerate(leaders) if leader == root)
         edges = tuple(i for i, pair in enumerate(ends) if links & set(pair))
-        twists = [reduced.twists[i].T for i in edges if reduced.tables.kind[i] != SPRING]
+        twists = [reduced.twists[i].T for i in edges if i < len(reduced.joints)]
         names = tuple(name for link in sorted(links) if (name := reduced.bodies[link]) is not None)
         out.append(
             ConnectedBodies(names, links, edges, generated(np.concatenate(twists) if twists else np.zeros((0, 6))))

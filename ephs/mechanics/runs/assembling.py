@@ -179,7 +179,7 @@ def _gears(joints: FlatJoints) -> dict[str, dict[str, float]]:
     wiring, out = joints.frames.wiring, dict[str, dict[str, float]]()
     named = {joint.rate: str(joint.path) for joint in joints.frames.joints if joint.pair.dim == 1}
     for number, slot in enumerate(wiring.components):
-        primitive, ports = slot.primitive, wiring.ports(number)
+        primitive, ports = slot.primitive, wiring.ports[number]
         if not isinstance(primitive, Reversible) or primitive.reads or not named.keys() >= set(ports.values()):
             continue
         _, rows = primitive.structure({})

@@ -1,6 +1,6 @@
 """Users' inputs as forces on a scene's joints, bodies and markers."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, final
 
@@ -72,6 +72,11 @@ def sum_of(one: Signal, other: Signal) -> Signal:
     return Signal(lambda t, state: one.at(t, state) + other.at(t, state), held=held, timed=timed)
 
 
+def add_to(signals: dict[Any, Signal], key: Hashable, more: Signal) -> None:
+    """Add a signal to that of the same key, if there is one."""
+    signals[key] = sum_of(signals[key], more) if key in signals else more
+
+
 def scene_signals(
     scene: Scene, inputs: Mapping[Any, Any], view: View
 ) -> tuple[dict[str, Signal], dict[str, Signal], dict[Path, Signal]]:
@@ -100,8 +105,7 @@ def scene_signals(
     sizes |= {f"shells.{name}": 1 for name in blown}
     sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
     for _, load in scene.all_loads():
-        push = _of_load(scene, load)
-        wrenches[load.body] = sum_of(wrenches[load.body], push) if load.body in wrenches else push
+        add_to(wrenches, load.body, _of_load(scene, load))
     for key, given in _single(inputs, sizes, view):
         kind, _, name = key.partition(".")
         if key in own:
@@ -114,25 +118,23 @@ def scene_signals(
         if kind in ("joints", "actuators"):
             of = actuators.get(key)
             if of is not None and of.tendon is not None:
-                port, (share,) = tension_port(of.tendon), _shares(of, given)
-                others[port] = sum_of(others[port], share) if port in others else share
+                add_to(others, tension_port(of.tendon), *_shares(of, given))
                 continue
             shares = {name: given} if of is None else dict(zip(of.joints, _shares(of, given), strict=True))
             for joint, share in shares.items():
-                forces[joint] = sum_of(forces[joint], share) if joint in forces else share
+                add_to(forces, joint, share)
             continue
         if kind == "shells":
             pressures[name] = given
             continue
         if kind == "markers":
             name, given = markers[name].body, _at_marker(scene, markers[name], given)
-        wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
+        add_to(wrenches, name, given)
     for name, sheet in blown.items():
         nodes, whole = pressed(scene, name, sheet, pressures[name])
         shared = Signal(_Latest(whole).at, soft=whole.soft)
         for i, node in enumerate(nodes):
-            push = part_of(shared, slice(6 * i, 6 * i + 6))
-            wrenches[node] = sum_of(wrenches[node], push) if node in wrenches else push
+            add_to(wrenches, node, part_of(shared, slice(6 * i, 6 * i + 6)))
     return forces, wrenches, others
 
 

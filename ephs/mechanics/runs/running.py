@@ -21,7 +21,7 @@ from ephs.solve.posing.errors import OptionError, SolveError
 from ephs.solve.posing.events import Event
 from ephs.solve.posing.problem import Problem, State
 from ephs.solve.result.solution import Solution
-from ephs.solve.running.abreast import PartRun, integrate_abreast
+from ephs.solve.running.abreast import Part, integrate_abreast
 from ephs.solve.running.control import RTOL, Control, Tolerance
 from ephs.solve.running.loop import RunLoop, integrate
 from ephs.solve.running.request import RunRequest
@@ -69,7 +69,7 @@ class Course:
     def _stepper(self, problem: Problem) -> tuple[Stepper[Any], Policy | None]:
         return self.method.make(Setting(problem, self.start, self.control, self.options, method=self.method.name))
 
-    def _parts(self, breakpoints: Breakpoints, request: RunRequest) -> list[PartRun]:
+    def _parts(self, breakpoints: Breakpoints, request: RunRequest) -> list[Part]:
         """Runs of the independent parts; none where what is asked for, or what inputs read, is of the whole.
 
         All steps of a run are kept of its whole, constant ones are its own, and impacts are events.
@@ -83,13 +83,12 @@ class Course:
         if len(factors) < 2:
             return []
         begin, asked = time.perf_counter(), replace(request, progress=None, remarks={})
-        parts: list[PartRun] = []
+        parts: list[Part] = []
         for factor in factors:
             own, known = _restricted(problem, factor.descriptor), breakpoints.again()
             seen = known.of(own)
-            stepper = self._stepper(seen)
-            run = RunLoop(seen, self.start, self.end, *stepper, control, known, asked, begin)
-            parts.append(PartRun(factor, run))
+            run = RunLoop(seen, self.start, self.end, *self._stepper(seen), control, known, asked, begin)
+            parts.append((factor, run))
         return parts
 
     def serves(self, name: str) -> bool:

@@ -10,7 +10,7 @@ from ephs.mechanics.constraints.redundancy import explain
 from ephs.mechanics.motion.motion import SceneMotion
 from ephs.mechanics.motion.views import view_of
 from ephs.mechanics.runs.assembling import check_closed
-from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
+from ephs.mechanics.runs.pushes import add_to, part_of, scene_signals
 from ephs.mechanics.scene.build import (
     drive_ports,
     initial_state,
@@ -23,7 +23,7 @@ from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.errors import SceneError, fault
 from ephs.mechanics.scene.meant import is_shaky
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.scene.state import Snapshot
+from ephs.mechanics.scene.state import scale_of
 from ephs.operad import Path
 from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Reference
@@ -91,7 +91,7 @@ def problem_of_scene(
                 raise AssemblyError(
                     "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
                 )
-            signals[port] = sum_of(signals[port], extra) if port in signals else extra
+            add_to(signals, port, extra)
     signals |= others
     signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
     world = scene.world
@@ -108,12 +108,12 @@ def problem_of_scene(
         constraints=lambda: ConfiguredMechanism.of(scene),
         dependences=lambda: explain(scene),
         shaky=lambda: is_shaky(scene),
-        length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),
+        length=scale_of(scene).length,
         view=view,
         names=scene_names(scene),
     )
     if initial:
-        scale, mass = Snapshot.of(scene).scale(world.gravity), sum(body.mass for _, body in scene.all_bodies())
+        scale, mass = scale_of(scene), sum(body.mass for _, body in scene.all_bodies())
         turning = (mass or 1.0) * scale.rate * scale.length**2
         check_closed(problem, turning / np.array([1.0] * 3 + [scale.length] * 3), t0)
     return problem

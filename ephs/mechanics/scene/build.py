@@ -145,10 +145,10 @@ def _initial_state(scene: Scene) -> dict[Path, Array]:
     for path, level in scene.levels():
         own, at = built(level), Path([word for part in path.split(".")[:-1] for word in ("parts", part)])
         states = once(form_of(level), "states of elements", lambda own=own: _element_states(own))
-        out |= {Path([*at, *state]): value for state, value in states.items()}
+        out |= {at / state: value for state, value in states.items()}
         for box, (element, start) in own.starts.items():
             for name, value in started(level, element, start).items():
-                out[Path([*at, *box, *name.split(".")])] = np.array(value, dtype=float)
+                out[at / box / name] = np.array(value, dtype=float)
     for value in out.values():
         value.flags.writeable = False
     return out

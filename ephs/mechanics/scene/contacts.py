@@ -22,6 +22,7 @@ from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.mechanics.shapes.pairs import PAIRS, touches
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces import SE3
 from ephs.semantics.systems.kept import once
 
 if TYPE_CHECKING:
@@ -176,17 +177,38 @@ class Contact(TouchingElement, section="contacts", said="pairs of surfaces that 
         site.add(made, {port[body]: site.momentum(body) for body in own} | warm, initial=self._start)
 
     def _start(self, site: Site) -> Mapping[str, Array]:
-        return {
-            f"point{i}.pe.q_r": site.between(point.bodies[0], point.frames[0], point.bodies[1], point.frames[1])
-            for i, point in enumerate(contact_points(site.scene, self))
-        }
+        starts = once(site.scene, "poses at contacts", lambda: _relative_poses(site))
+        return {f"point{i}.pe.q_r": pose for i, pose in enumerate(starts[tuple(self.surfaces)])}
 
     def __str__(self) -> str:
         return " – ".join(self.surfaces)
 
 
+def _relative_poses(site: Site) -> dict[tuple[str, ...], Array]:
+    """(points, 7) at the start, poses of the second frames of points in the first ones, by the surfaces of contacts.
+
+    Those of all contacts are made at once, in about the time of those of one.
+    """
+    every = _every_point(site.scene)
+    points = [point for some in every.values() for point in some]
+    poses = {body: site.pose(body) for body in {body for point in points for body in point.bodies}}
+
+    def placed(k: int) -> Array:
+        bodies, frames = [poses[point.bodies[k]] for point in points], [point.frames[k] for point in points]
+        return SE3.compose(*(np.array(each).reshape(-1, 7).T for each in (bodies, frames)))
+
+    relative = SE3.normalise(SE3.compose(SE3.inverse(placed(0)), placed(1))).T
+    ends = np.cumsum([len(some) for some in every.values()])
+    return dict(zip(every, np.split(relative, ends), strict=False))
+
+
 def contact_points(scene: "Scene", of: Contact) -> Points:
-    """Points of a contact, as seen from a scene; made once for all its contacts and kept with it."""
+    """Points of a contact, as seen from a scene."""
+    return _every_point(scene)[tuple(of.surfaces)]
+
+
+def _every_point(scene: "Scene") -> dict[tuple[str, ...], Points]:
+    """Points of all contacts of a scene, by their surfaces; made once and kept with it."""
     scene = form_of(scene)
 
     def made() -> dict[tuple[str, ...], Points]:
@@ -196,7 +218,7 @@ def contact_points(scene: "Scene", of: Contact) -> Points:
             out[tuple(each.surfaces)] = _points(scene, *(surfaces[name] for name in each.surfaces))
         return out
 
-    return once(scene, "contact points", made)[tuple(of.surfaces)]
+    return once(scene, "contact points", made)
 
 
 def _points(scene: "Scene", one: Surface, other: Surface) -> Points:

@@ -40,7 +40,7 @@ from ephs.mechanics.scene.resolve_elements import (
     settled,
     with_contacts,
 )
-from ephs.mechanics.scene.state import Snapshot, adjusted
+from ephs.mechanics.scene.state import adjusted, scale_of
 from ephs.mechanics.scene.stops import beyond, with_stops
 from ephs.mechanics.scene.text import file_inside, file_text, lost
 from ephs.mechanics.scene.thermal import ThermalNode
@@ -201,7 +201,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _FileRead
     if faults:
         return None
     touched = bool(scene.contacts) or any(joint.limits is not None for _, joint in scene.all_joints())
-    length = Snapshot.of(scene).scale(world.gravity).length if touched else 1.0
+    length = scale_of(scene).length if touched else 1.0
     r.odd.extend([*beyond(scene, length, faults), *overlaps(scene, length, faults)])
     faults += placed_faults(scene)
     if faults:

@@ -16,7 +16,7 @@ from ephs.mechanics.scene.element import POSE, NumberForm
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
-from ephs.mechanics.scene.state import Snapshot
+from ephs.mechanics.scene.state import scale_of
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
@@ -52,7 +52,7 @@ class OwnUnits:
             ports = (port.quantity for port in system.interface.values())
             if not all(_is_known(of) for of in (*system.states.values(), *ports)):
                 return SI
-        scale = Snapshot.of(scene).scale(scene.world.gravity)
+        scale = scale_of(scene)
         mass = sum(body.mass for _, body in scene.all_bodies()) or 1.0
         sizes = scale.length, mass, 1.0 / scale.rate
         return OwnUnits(*(2.0 ** (near * round(np.log2(x) / near)) for x, near in zip(sizes, NEAR, strict=True)))

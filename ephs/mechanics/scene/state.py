@@ -29,6 +29,7 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.systems.initial import saved_at
+from ephs.semantics.systems.kept import once
 
 # Elements of registered sections in the states of a solution.
 
@@ -117,6 +118,11 @@ class Snapshot:
         """The length and rate by which gaps and velocities are measured."""
         radius = gyration((body.mass, body.inertia) for body in self.bodies)
         return Scale.of(self.links, self.poses, self.twists, radius, gravity)
+
+
+def scale_of(scene: Scene) -> Scale:
+    """The length and rate of a scene, made once."""
+    return once(scene, "scale", lambda: Snapshot.of(scene).scale(scene.world.gravity))
 
 
 def with_state(

@@ -11,7 +11,7 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.joints import Joint, JointEntry
 from ephs.mechanics.scene.model import Scene, frozen
-from ephs.mechanics.scene.state import Snapshot
+from ephs.mechanics.scene.state import scale_of
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import ConstitutiveLaw
 
@@ -58,7 +58,7 @@ def _stop(scene: Scene, joint: Joint, table: Checked[JointEntry]) -> Constitutiv
 
 def _stiffness(scene: Scene, joint: Joint) -> float:
     """Default stiffness of a joint's stops, N m/rad or N/m; 0 where the scene has no rate of its own."""
-    scale = Snapshot.of(scene).scale(scene.world.gravity)
+    scale = scale_of(scene)
     mass = sum(body.mass for _, body in scene.all_bodies())
     return float(STIFF * mass * scale.rate**2 * (scale.length**2 if _turns(joint) else 1.0))
 

@@ -27,7 +27,6 @@ from ephs.mechanics.sensitivity.family import (
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
-from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse
@@ -343,8 +342,7 @@ class ExplicitTangent:
     def _normalised(self, q: Array) -> Array:
         """Elements, their quaternions of length one."""
         reduced, out = self.equations.reduced, q.copy()
-        for i, edge in enumerate(reduced.edges):
-            if reduced.tables.kind[i] != SPRING:
-                where = slice(int(reduced.tables.q_at[i]), int(reduced.tables.q_at[i] + reduced.tables.q_size[i]))
-                out[where] = edge.pair.manifold.normalise(q[where])
+        for i, edge in enumerate(reduced.joints):
+            where = slice(int(reduced.tables.q_at[i]), int(reduced.tables.q_at[i] + reduced.tables.q_size[i]))
+            out[where] = edge.pair.manifold.normalise(q[where])
         return out

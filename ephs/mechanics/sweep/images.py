@@ -74,7 +74,7 @@ class CompiledStart:
             eq.drive,
             eq.wrench,
             eq.scal,
-            eq.gravity,
+            eq.reduced.gravity,
             self.start.q,
             self.start.r,
             self.start.heats,

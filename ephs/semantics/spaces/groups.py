@@ -190,12 +190,16 @@ class RigidMotions(_Poses):
     """SE(3), stored as [w, x, y, z, rx, ry, rz]: rotation from body to world, position of the body."""
 
     def compose(self, a: Array, b: Array) -> Array:
-        # numbers, not arrays: setting up a mechanism composes some twenty poses a body
-        w, x, y, z, *at = a.tolist()
-        s, i, j, k, *to = b.tolist()
+        # numbers, not arrays: setting up a mechanism composes some twenty poses a body; of many (7, n) to the same bits
+        w, x, y, z, *at = a.tolist() if a.ndim == 1 else a
+        s, i, j, k, *to = b.tolist() if b.ndim == 1 else b
         a0, a1 = w * s - x * i - y * j - z * k, w * i + x * s + y * k - z * j
         a2, a3 = w * j - x * k + y * s + z * i, w * k + x * j - y * i + z * s
-        size = sqrt(a0 * a0 + a1 * a1 + a2 * a2 + a3 * a3) * (1.0 if a0 >= 0.0 else -1.0)
+        square = a0 * a0 + a1 * a1 + a2 * a2 + a3 * a3
+        if a.ndim == 1:
+            size = sqrt(square) * (1.0 if a0 >= 0.0 else -1.0)
+        else:
+            size = np.sqrt(square) * np.where(a0 >= 0.0, 1.0, -1.0)
         e, f, g = y * to[2] - z * to[1], z * to[0] - x * to[2], x * to[1] - y * to[0]
         return np.array([
             a0 / size, a1 / size, a2 / size, a3 / size,
@@ -205,7 +209,7 @@ class RigidMotions(_Poses):
         ])  # fmt: skip
 
     def inverse(self, a: Array) -> Array:
-        w, x, y, z, *at = a.tolist()
+        w, x, y, z, *at = a.tolist() if a.ndim == 1 else a
         e, f, g = y * at[2] - z * at[1], z * at[0] - x * at[2], x * at[1] - y * at[0]
         return np.array([
             w, -x, -y, -z,

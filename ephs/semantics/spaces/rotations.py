@@ -138,8 +138,8 @@ def matrix_to_quaternion(m: Array) -> Array:
 
 
 def normalised(q: Array) -> Array:
-    """The quaternion divided by its length."""
-    return q / np.sqrt(q @ q)
+    """The quaternion, or each of many (4, n), divided by its length."""
+    return q / np.sqrt(q @ q if q.ndim == 1 else (q * q).sum(axis=0))
 
 
 def rotation_log(q: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.model import Scene, frozen
-from ephs.mechanics.scene.state import Snapshot
+from ephs.mechanics.scene.state import scale_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.runs import Array, RunEnding, RunSetting, attempt
 from ephs.show.shared.errors import ShowError
@@ -225,7 +225,7 @@ def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> t
 
 
 def _length(scene: Scene) -> float:
-    return Snapshot.of(scene).scale(scene.world.gravity).length
+    return scale_of(scene).length
 
 
 def _candidates(until: float) -> Iterator[tuple[str, RunSetting, RunSetting]]:

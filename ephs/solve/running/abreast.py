@@ -5,7 +5,6 @@ The solution of the whole has the states of all parts and the sums of their ledg
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Final, final
 
 import numpy as np
@@ -20,17 +19,11 @@ from ephs.solve.running.ending import audited, failures_of
 from ephs.solve.running.loop import RESPONSE, RunLoop
 from ephs.solve.running.request import RunRequest
 
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class PartRun:
-    """The run of an independent part of a problem; it keeps the same times as the others."""
-
-    factor: Factor
-    run: RunLoop[Any]
+Part = tuple[Factor, RunLoop[Any]]
+"""An independent part of a problem and its run, which keeps the same times as the others."""
 
 
-def integrate_abreast(problem: Problem, parts: Sequence[PartRun], request: RunRequest) -> Solution:
+def integrate_abreast(problem: Problem, parts: Sequence[Part], request: RunRequest) -> Solution:
     """Solve the initial value problems of the independent parts of a problem, as `integrate` does the whole.
 
     Raises
@@ -50,15 +43,15 @@ def integrate_abreast(problem: Problem, parts: Sequence[PartRun], request: RunRe
 class _Abreast:
     """Runs of parts, of which the one that is behind goes on first, so that all are near each other when they end."""
 
-    def __init__(self, problem: Problem, parts: Sequence[PartRun], request: RunRequest) -> None:
-        self.problem, self.parts, self.request, self.bounds = problem, parts, request, request.bounds
-        self.runs = [part.run for part in parts]
+    def __init__(self, problem: Problem, parts: Sequence[Part], request: RunRequest) -> None:
+        self.problem, self.request, self.bounds = problem, request, request.bounds
+        self.factors, self.runs = zip(*parts, strict=True)
         first = self.runs[0]
         self.t0, self.until, self.t, self.h = first.t0, first.until, first.t0, 0.0
         self.begin = self.looked = first.begin
         self.setup = 0.0
-        shared = np.bincount(np.concatenate([part.factor.states for part in parts])) > 1
-        self.shared = [shared[part.factor.states] for part in parts]
+        shared = np.bincount(np.concatenate([factor.states for factor in self.factors])) > 1
+        self.shared = [shared[factor.states] for factor in self.factors]
 
     def start(self) -> None:
         """The first row of each."""
@@ -138,11 +131,11 @@ class _Abreast:
         records = [record[:count] for record in records]
         start = self.problem.point
         x, energies = np.tile(start, (count, 1)), np.zeros((count, len(self.problem.descriptor.components)))
-        for part, shared, record in zip(self.parts, self.shared, records, strict=True):
-            own, several = part.factor.states[~shared], part.factor.states[shared]
+        for factor, shared, record in zip(self.factors, self.shared, records, strict=True):
+            own, several = factor.states[~shared], factor.states[shared]
             x[:, own] = record.x[:, ~shared]
             x[:, several] += record.x[:, shared] - start[several]
-            energies[:, part.factor.components] = record.energies  # the environment's is read off its states
+            energies[:, factor.components] = record.energies  # the environment's is read off its states
         sums = sum(record.ledgers[:, :4] for record in records)
         least = np.min([record.ledgers[:, 4:] for record in records], axis=0)
         return RunRecord(records[0].t, x, energies, np.hstack([sums, least]))

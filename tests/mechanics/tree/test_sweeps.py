@@ -9,7 +9,7 @@ from tests.scenes import equations_of
 def packed(family, size):
     """The records of the links of a tree."""
     eq = equations_of(families.scene(family, size))
-    return links_of(eq.reduced).packed(eq.gravity)
+    return links_of(eq.reduced).packed(eq.reduced.gravity)
 
 
 def test_a_plane_leaves_the_third_dimension_out():

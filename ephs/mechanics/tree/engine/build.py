@@ -16,7 +16,7 @@ from ephs.mechanics.road.rigid import SUMS
 from ephs.mechanics.tree.engine.attachment import Attachment, attachment_of, with_derivatives
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.islands import islands_of
-from ephs.mechanics.tree.engine.links import LinkFrames, links_of
+from ephs.mechanics.tree.engine.links import Found, links_of
 from ephs.mechanics.tree.engine.tables import Forces, table_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, MechanismTables
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, TOTALS, CompiledComponent, Own
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 def engine_of(
     reduced: "Reduced",
-    gravity: Array,
     drive: Array,
     wrench: Array,
     scal: Array,
@@ -50,8 +49,6 @@ def engine_of(
 
     Parameters
     ----------
-    gravity
-        (3,) in world axes.
     drive, wrench, scal
         Given forces (joints' degrees of freedom,), given wrenches (bodies, 6), and (h, θ₀, π₀), which are read where
         they are.
@@ -69,8 +66,8 @@ def engine_of(
         Whether steps keep the momenta of islands.
     """
     rows = None if kept is None else tuple(tuple(each.tolist()) for each in kept)
-    key = "engine", gravity.tobytes(), acted, rows, apart, momenta
-    plan = once(reduced, key, lambda: _plan(reduced, gravity, drive.size, acted, kept, apart=apart, momenta=momenta))
+    key = "engine", acted, rows, apart, momenta
+    plan = once(reduced, key, lambda: _plan(reduced, drive.size, acted, kept, apart=apart, momenta=momenta))
     tables = {**plan.tables, "drive": drive, "wrench": wrench, "scal": scal, "supply": supply, "lead": lead}
     tables |= {name: plan.tables[name].copy() for name in ("net", "numbers")}  # they hold the network's memory, too
     work: dict[str, Any] = {name: np.zeros(shape) for name, shape in plan.shapes.items()}
@@ -99,7 +96,6 @@ class _EnginePlan:
 
 def _plan(
     reduced: "Reduced",
-    gravity: Array,
     rates: int,
     acted: tuple[frozenset[int], frozenset[int]],
     kept: Sequence[Array] | None,
@@ -109,16 +105,15 @@ def _plan(
 ) -> _EnginePlan:
     """The plan of an engine, ``rates`` the number of all joints' rates."""
     found = links_of(reduced, apart=apart)
-    bodies, ground = found.bodies, found.ground
-    cut, cut_numbers, ends = _cut(reduced, bodies, ground, kept)
+    cut, cut_numbers, ends = _cut(reduced, found, kept)
     charts = _chart(reduced, cut)
-    forces = _forces(reduced, bodies, ground, cut, acted)
+    forces = _forces(reduced, found, cut, acted)
     net = attachment_of(reduced)
     attached = reduced.attaching.network.acts
     forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1) or attached)
     driven = any(part.joint.driven for part in found.parts)
     island, bases = islands_of(reduced, found, acted)
-    records = found.packed(gravity)
+    records = found.packed(reduced.gravity)
     program = sweeps(records.kind, general=bool(forced or driven or len(cut) or apart))
     eliminated = closing([part.parent for part in found.parts], ends)
     reached = _reached(program.program, loop_program(_kinds(charts, cut)))
@@ -144,8 +139,7 @@ def _plan(
 class WholeMechanism(NamedTuple):
     """A mechanism with all rows of its loops, and with all its joints and bodies acted on."""
 
-    bodies: LinkFrames
-    ground: Array
+    found: Found
     records: Packed
     kinds: tuple[GroupKind, ...]  # of its joints
     usual: bool  # whether its joints are standard ones, which all are in its class
@@ -154,8 +148,8 @@ class WholeMechanism(NamedTuple):
     shapes: dict[str, tuple[int, ...]]  # of its memory, without what the class's program takes for links
 
 
-def whole_of(reduced: "Reduced", gravity: Array) -> WholeMechanism:
-    """A reduced scene under gravity (3,) in world axes, for equations over dense matrices.
+def whole_of(reduced: "Reduced") -> WholeMechanism:
+    """A reduced scene, for equations over dense matrices.
 
     What acts is evaluated with derivatives. Prescribed motions are rows, and nothing is eliminated.
     """
@@ -164,11 +158,11 @@ def whole_of(reduced: "Reduced", gravity: Array) -> WholeMechanism:
         replace(part, joint=replace(part.joint, driven=False, armature=part.armature > 0.0)) for part in found.parts
     ]
     usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
-    records = replace(found, parts=parts, planar=False).packed(gravity, among=STANDARD if usual else ())
-    cut, cut_numbers, ends = _cut(reduced, found.bodies, found.ground, None)
+    records = replace(found, parts=parts, planar=False).packed(reduced.gravity, among=STANDARD if usual else ())
+    cut, cut_numbers, ends = _cut(reduced, found, None)
     charts, size = _chart(reduced, cut), 2 * int(cut[:, 8].sum())
-    joints = frozenset(i for i in range(len(reduced.edges)) if t.kind[i] != SPRING)
-    forces = _forces(reduced, found.bodies, found.ground, cut, (joints, frozenset(range(reduced.links))))
+    joints = frozenset(range(len(reduced.joints)))
+    forces = _forces(reduced, found, cut, (joints, frozenset(range(reduced.links))))
     net, none = attachment_of(reduced), np.zeros(0, dtype=np.int64)
     attached = reduced.attaching.network.acts
     reached = {"attach": (network_program(), "solve")} if attached else {}
@@ -178,11 +172,11 @@ def whole_of(reduced: "Reduced", gravity: Array) -> WholeMechanism:
     tables = {**links, **_joints(charts, cut, cut_numbers, whole), **forces.tables(), **_attached(net)}
     tables = with_derivatives(tables, t.address)
     booked = len(reduced.entropies), len(reduced.entropies) + TOTALS + len(reduced.made)
-    shapes = _shapes(0, (len(parts), 0), reduced.freedoms, int(t.dim[sorted(joints)].sum()), len(cut), booked, whole)
+    shapes = _shapes(0, (len(parts), 0), reduced.freedoms, int(t.dim[: len(joints)].sum()), len(cut), booked, whole)
     shapes["located"] = tables["middle"].size, 6
     shapes |= {"value": (len(ends), 4), "covector": (size, 6), "e": (64,), "jac": (1024,), "scratch": (4096,)}
     return WholeMechanism(
-        found.bodies, found.ground, records, _kinds(charts, cut), usual, forces.body_frame, tables, shapes
+        found, records, _kinds(charts, cut), usual, forces.body_frame, tables, shapes
     )  # fmt: skip
 
 
@@ -271,28 +265,26 @@ def _matrix(pose: Array) -> Array:
     return np.concatenate([quaternion_to_matrix(pose[:4]).ravel(), pose[4:]])
 
 
-def _ends(reduced: "Reduced", bodies: LinkFrames, ground: Array, i: int) -> tuple[int, int, Array]:
+def _ends(reduced: "Reduced", found: Found, i: int) -> tuple[int, int, Array]:
     """Links of an edge, and (24,) its frames there."""
     t = reduced.tables
     links, frames = [], []
     for body, offset in ((int(t.first[i]), t.offset1[i]), (int(t.second[i]), t.offset2[i])):
-        link, inside = (bodies.link[body], bodies.inside[body]) if body >= 0 else (-1, ground)
+        link, inside = (found.link[body], found.inside[body]) if body >= 0 else (-1, found.ground)
         links.append(link)
         frames.append(_matrix(SE3.compose(inside, offset)))
     return links[0], links[1], np.concatenate(frames)
 
 
-def _cut(
-    reduced: "Reduced", bodies: LinkFrames, ground: Array, kept: Sequence[Array] | None
-) -> tuple[Index, Array, list[tuple[int, ...]]]:
+def _cut(reduced: "Reduced", found: Found, kept: Sequence[Array] | None) -> tuple[Index, Array, list[tuple[int, ...]]]:
     """Cut joints with the numbers of their edges behind them, their numbers, and the links of each row."""
     t = reduced.tables
-    found = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
+    closing = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
     cut: list[tuple[int, ...]] = []
     numbers: list[Array] = []
     ends: list[tuple[int, ...]] = []
-    for k, i in enumerate(found):
-        one, two, frame = _ends(reduced, bodies, ground, i)
+    for k, i in enumerate(closing):
+        one, two, frame = _ends(reduced, found, i)
         chosen = np.arange(int(t.rows[i])) if kept is None else kept[k]
         if one == two:
             chosen = chosen[:0]
@@ -305,12 +297,12 @@ def _cut(
         ends += [(one, two)] * chosen.size
     size = 2 * len(ends)
     for number, tie in enumerate(reduced.attaching.ties):
-        if kept is not None and not kept[len(found) + number].size:
+        if kept is not None and not kept[len(closing) + number].size:
             continue
         at = size
         links: list[int] = []
         for i, freedom, ratio in tie.terms:
-            one, two, frame = _ends(reduced, bodies, ground, i)
+            one, two, frame = _ends(reduced, found, i)
             numbers.append(np.concatenate([frame, _geared(reduced, i, freedom, ratio)]))
             cut.append((one, two, TIE, 0, t.q_at[i] + freedom, 1, t.r_at[i], len(ends), 1, size + len(links), -1))
             links += [one, two]
@@ -328,25 +320,22 @@ def _geared(reduced: "Reduced", edge: int, freedom: int, ratio: float) -> Array:
     t = reduced.tables
     basis, left, normal = np.zeros((3, 6, 6))
     basis[:, 0], left[0], normal[0] = t.basis[edge][:, freedom], t.left[edge][freedom], ratio * t.left[edge][freedom]
-    start = reduced.edges[edge].coordinate[freedom]
+    start = reduced.elements[edge][freedom]
     return np.concatenate([basis.ravel(), left.ravel(), normal.ravel(), [start]])
 
 
 def _chart(reduced: "Reduced", cut: Index) -> Index:
     t = reduced.tables
-    joints = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
     number = {int(i): k for k, i in enumerate(cut[:, -1])}
     found = [
         [t.code[i], t.dim[i], t.q_at[i], t.q_size[i], t.r_at[i], t.r_at[i], number.get(i, -1)]
-        for i in joints
+        for i in range(len(reduced.joints))
         if t.dim[i]
     ]
     return np.array(found, dtype=np.int64).reshape(-1, 7)
 
 
-def _forces(
-    reduced: "Reduced", bodies: LinkFrames, ground: Array, cut: Index, acted: tuple[frozenset[int], frozenset[int]]
-) -> Forces:
+def _forces(reduced: "Reduced", found: Found, cut: Index, acted: tuple[frozenset[int], frozenset[int]]) -> Forces:
     t = reduced.tables
     number = {int(i): k for k, i in enumerate(cut[:, -1])}
     edges: list[list[int]] = []
@@ -360,7 +349,7 @@ def _forces(
         friction = int(t.friction[i])
         if t.dim[i] == 0 or (max(t.spring[i], t.several[i], friction) < 0 and i not in acted[0]):
             continue
-        one, two, frame = _ends(reduced, bodies, ground, i)
+        one, two, frame = _ends(reduced, found, i)
         if t.kind[i] != SPRING:
             port |= {int(t.r_at[i]) + j: [int(t.r_at[i]) + j, len(edges), j] for j in range(int(t.dim[i]))}
         kind = {TREE: ON_TREE, CUT: ON_CUT, SPRING: ON_BODIES}[int(t.kind[i])]
@@ -380,8 +369,8 @@ def _forces(
         frame=np.array(frames).reshape(-1, 24),
         left=np.array(left).reshape(-1, 36),
         reach=np.array(reach).reshape(-1, 9),
-        body=np.array([bodies.link[b] if b in acted[1] else -1 for b in range(reduced.links)], dtype=np.int64),
-        body_frame=np.array([_matrix(inside) for inside in bodies.inside]).reshape(-1, 12),
+        body=np.array([found.link[b] if b in acted[1] else -1 for b in range(reduced.links)], dtype=np.int64),
+        body_frame=np.array([_matrix(inside) for inside in found.inside]).reshape(-1, 12),
         node=reduced.nodes,
         conduction=t.conduction,
         sink=t.sink,

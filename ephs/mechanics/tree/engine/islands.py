@@ -36,7 +36,7 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
     tuple[Index, Array]
         Columns beyond the dimension of what an island may do are zero.
     """
-    t, link = reduced.tables, found.bodies.link
+    t, link = reduced.tables, found.link
     both = zip(t.first.tolist(), t.second.tolist(), strict=True)
     ends = [[-1 if body < 0 else link[body] for body in bodies] for bodies in both]
     groups = _joined(len(found.parts), ends)
@@ -48,7 +48,7 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
             continue
         inside = max(t.spring[i], t.several[i], t.friction[i]) >= 0
         acting = inside or i in acted[0] or _inert(reduced, i)
-        free = np.zeros((6, 0)) if acting else reduced.twists[i] if t.kind[i] != SPRING else np.eye(6)
+        free = np.zeros((6, 0)) if acting else reduced.twists[i] if i < len(reduced.joints) else np.eye(6)
         key = free.tobytes()
         if key not in held:
             held[key] = complement(free)

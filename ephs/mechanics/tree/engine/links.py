@@ -9,7 +9,6 @@ import numpy as np
 from ephs.mechanics.constraints.subgroup import Subgroup, generated
 from ephs.mechanics.road.pack import SLIDE, TURN, Packed, PackedLink, packed
 from ephs.mechanics.road.records import JointKind
-from ephs.mechanics.tree.finding.tables import SPRING, TREE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.codes import VECTOR
@@ -24,15 +23,6 @@ FLAT = 1e-9
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class LinkFrames:
-    """Poses of bodies in the frames of the links that they belong to, found outwards along the tree."""
-
-    link: list[int]
-    inside: list[Array]
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """The links of a reduced scene, parents first.
 
@@ -40,8 +30,8 @@ class Found:
     ----------
     parts
         What the sweeps' records are made of.
-    bodies
-        Where the bodies are in them.
+    link, inside
+        Link that each body belongs to, and the body's pose in its frame, found outwards along the tree.
     ground
         Pose of the world in the ground's frame, whose z axis is the normal of a planar mechanism.
     planar
@@ -49,7 +39,8 @@ class Found:
     """
 
     parts: Sequence[PackedLink]
-    bodies: LinkFrames
+    link: list[int]
+    inside: list[Array]
     ground: Array
     planar: bool
 
@@ -66,30 +57,28 @@ def links_of(reduced: "Reduced", *, apart: bool = False) -> Found:
     transmit is then known of all of them, in all six directions.
     """
     t = reduced.tables
-    joints = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
-    normal = None if apart else _plane(reduced, joints)
+    normal = None if apart else _plane(reduced)
     ground = SE3.identity() if normal is None else np.concatenate([matrix_to_quaternion(_onto(normal)), np.zeros(3)])
-    bodies = LinkFrames([], [])
-    parts: list[PackedLink] = []
+    links, places, parts = list[int](), list[Array](), list[PackedLink]()
     for i in range(reduced.links):
         parent = int(t.parent[i])
-        above, inside = (bodies.link[parent], bodies.inside[parent]) if parent >= 0 else (-1, ground)
+        above, inside = (links[parent], places[parent]) if parent >= 0 else (-1, ground)
         forward = bool(t.forward[i])
         near, far = (t.offset1[i], t.offset2[i]) if forward else (t.offset2[i], t.offset1[i])
         edge = reduced.edges[i]
         if edge.pair.dim == 0 and not apart:
-            bodies.link.append(above)
-            bodies.inside.append(SE3.compose(SE3.compose(inside, near), SE3.inverse(far)))
+            links.append(above)
+            places.append(SE3.compose(SE3.compose(inside, near), SE3.inverse(far)))
             if above >= 0:
-                parts[above].numbers[:] += _inertia(t.inertia[i], bodies.inside[i])
+                parts[above].numbers[:] += _inertia(t.inertia[i], places[i])
             continue
         turn = SE3.identity()
         joint = SE3.compose(inside, near)
         if normal is not None:
             turn = np.concatenate([matrix_to_quaternion(_flat(joint, edge.pair.name)), np.zeros(3)])
         joint = SE3.compose(joint, turn)
-        bodies.link.append(len(parts))
-        bodies.inside.append(SE3.compose(SE3.inverse(turn), SE3.inverse(far)))
+        links.append(len(parts))
+        places.append(SE3.compose(SE3.inverse(turn), SE3.inverse(far)))
         sign, driven = 1 if forward else -1, edge.pair.dim > 0 and bool(t.driven[t.r_at[i]])
         if normal is not None:
             kind = replace(TURN if edge.pair.name == "revolute" else SLIDE, driven=driven)
@@ -100,11 +89,11 @@ def links_of(reduced: "Reduced", *, apart: bool = False) -> Found:
             kind, sign = JointKind(edge.pair.code, edge.pair.size, columns, inverted, driven), 1 if inverted else sign
         matrix = quaternion_to_matrix(joint[:4])
         numbers = np.concatenate([matrix.ravel(), joint[4:], np.zeros(10)])
-        numbers += _inertia(t.inertia[i], bodies.inside[-1])
+        numbers += _inertia(t.inertia[i], places[-1])
         own = float(t.armature[t.r_at[i]]) if edge.pair.dim else 0.0
         kind = replace(kind, armature=own > 0.0 and not driven)
         parts.append(PackedLink(kind, above, int(t.q_at[i]), int(t.r_at[i]), sign, numbers, own))
-    return Found(parts, bodies, ground, normal is not None)
+    return Found(parts, links, places, ground, normal is not None)
 
 
 def plane_of(twists: Array) -> Array | None:
@@ -135,12 +124,12 @@ def _inertia(own: Array, inside: Array) -> Array:
     return out
 
 
-def _plane(reduced: "Reduced", joints: list[int]) -> Array | None:
+def _plane(reduced: "Reduced") -> Array | None:
     """The normal of the plane in which everything moves, for mechanisms of pins and slides only."""
-    kinds = {reduced.edges[i].pair.name for i in joints if reduced.tables.kind[i] == TREE and reduced.tables.dim[i]}
+    kinds = {edge.pair.name for edge in reduced.edges[: reduced.links] if edge.pair.dim}
     if not kinds or not kinds <= {"revolute", "prismatic"}:
         return None
-    return plane_of(np.concatenate([reduced.twists[i].T for i in joints]))
+    return plane_of(np.concatenate([twists.T for twists in reduced.twists]))
 
 
 def _onto(normal: Array) -> Array:

@@ -51,8 +51,8 @@ class Dense:
         (n,) and (m,) the accelerations and multipliers that `forward` found last: of prescribed rates, then of loops.
     """
 
-    def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array, lead: Array) -> None:
-        self.reduced, self.residual = reduced, Residual(reduced, gravity, scal, supply)
+    def __init__(self, reduced: Reduced, scal: Array, supply: Array, lead: Array) -> None:
+        self.reduced, self.residual = reduced, Residual(reduced, scal, supply)
         t, found, arrays = reduced.tables, self.residual, self.residual.arrays
         self._driven, self._lead, self._led = int(t.driven.sum()), lead, np.flatnonzero(t.driven)
         self._m, self._rank = found.m + self._driven, 0

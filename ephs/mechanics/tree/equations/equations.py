@@ -25,7 +25,6 @@ from ephs.mechanics.tree.equations.state import Reactions, ReducedState
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.mechanics.tree.finding.naming import tolerances, within
-from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Array
@@ -67,15 +66,14 @@ class ReducedEquations:
         self.model = model = model_of(problem, t0, matrix=False)
         self.reduced = reduced = reduce_system(problem, model)
         self._dense: Dense | None = None
-        t = reduced.tables
-        self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
+        t, joints = reduced.tables, range(len(reduced.joints))
         self.careful = self._factored = False
         self._closed_at = np.zeros(0), np.zeros(0)
-        self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
+        self.nv, self.n, self.ns = int(t.dim[: len(joints)].sum()), reduced.freedoms, len(reduced.entropies)
         self.summed = TOTALS + len(reduced.made)
         self.size = self.nv + self.n + self.ns + self.summed
         self.prescribed = Prescribed(reduced)
-        groups = [i for i in self._moving if t.code[i] != VECTOR]
+        groups = [i for i in joints if t.code[i] != VECTOR]
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self._owner = np.repeat(np.arange(reduced.links), t.dim[: reduced.links])
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
@@ -92,16 +90,16 @@ class ReducedEquations:
         self.steady, self.timed = self.constant or self.held, problem.timed
         self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
         self.booking, self.accounts, self.evaluations = Booking(self, self._paper), Accounts(self), 0
-        self.gravity, self.driven = reduced.gravity, self.prescribed.freedoms
+        self.driven = self.prescribed.freedoms
         self._momenta = False
         self.holding: Reactions | None = None
-        self._acted = self.given.acted(set(self._moving) if pushed else set())
+        self._acted = self.given.acted(set(joints) if pushed else set())
         self._build(None)
 
     def _build(self, kept: "list[Array] | None") -> None:
         """The engine, with all rows of the cut joints or those that are kept."""
         self.engine = engine_of(
-            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self.prescribed.lead,
+            self.reduced, self.drive, self.wrench, self.scal, self.given.supply, self.prescribed.lead,
             self._acted, kept, apart=self._apart, momenta=self._momenta,
         )  # fmt: skip
 
@@ -248,7 +246,7 @@ class ReducedEquations:
     def dense(self) -> Dense:
         """Sweeps over dense matrices, made when they are first asked for."""
         if self._dense is None:
-            self._dense = Dense(self.reduced, self.gravity, self.scal, self.given.supply, self.prescribed.lead)
+            self._dense = Dense(self.reduced, self.scal, self.given.supply, self.prescribed.lead)
         return self._dense
 
     def refilled(self) -> None:

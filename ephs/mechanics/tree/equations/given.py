@@ -8,7 +8,6 @@ import numpy as np
 from ephs.mechanics.tree.equations.prescribed import Prescribed
 from ephs.mechanics.tree.finding.frames import GROUND
 from ephs.mechanics.tree.finding.mechanism import Reduced
-from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -95,7 +94,7 @@ class Given:
     def acted(self, edges: set[int]) -> tuple[frozenset[int], frozenset[int]]:
         """Edges, beside those given, and links on which they act."""
         t = self._reduced.tables
-        at = {int(t.r_at[i]): i for i in range(len(self._reduced.edges)) if t.kind[i] != SPRING and t.dim[i]}
+        at = {int(t.r_at[i]): i for i in range(len(self._reduced.joints)) if t.dim[i]}
         links = {link for _, link, _ in self._wrenches}
         pushed = {at[where.start] for _, where in self._drives if where.start in at}
         pushed |= {i for first, i in at.items() if first in self._reduced.attaching.edges}

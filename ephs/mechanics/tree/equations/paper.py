@@ -102,14 +102,15 @@ class PaperStates:
     def rows(self, q: Array, r: Array, s: Array) -> Array:
         """(rows, point_size) all states, of rows of joints' elements, rates and entropies."""
         out = np.tile(self.rest, (q.shape[0], 1))
+        self.walked(q, r, self.stored(r, s), out)()
         if not self._known and q.shape[0]:
             self._known = True
-            first = self.rows(q[:1], r[:1], s[:1])[0]
             # a pose has two quaternions: that one which is continuous with the initial one
             posed = np.isin(self._plan[:, 0], (POSE, RELATIVE))
             at = self._plan[posed, 2, None] + np.arange(4)
-            self._plan[posed, -1] = (first[at] * self.rest[at]).sum(axis=1) < 0.0
-        self.walked(q, r, self.stored(r, s), out)()
+            self._plan[posed, -1] = (out[0, at] * self.rest[at]).sum(axis=1) < 0.0
+            if self._plan[posed, -1].any():
+                return self.rows(q, r, s)
         return out
 
     def walked(self, q: Array, r: Array, stored: Array, x: Array) -> Bound:
@@ -132,10 +133,9 @@ class PaperStates:
         """(q, r, s) of the problem's initial states."""
         tables, reduced, initial = self.reduced.tables, self.reduced, self.problem.initial
         q = np.zeros(reduced.coordinates)
-        for i, edge in enumerate(reduced.edges):
-            if tables.kind[i] != SPRING:
-                given = edge.pair.manifold.identity() if edge.state is None else initial[edge.state]
-                q[int(tables.q_at[i]) : int(tables.q_at[i] + tables.q_size[i])] = given
+        for i, edge in enumerate(reduced.joints):
+            given = edge.pair.manifold.identity() if edge.state is None else initial[edge.state]
+            q[int(tables.q_at[i]) : int(tables.q_at[i] + tables.q_size[i])] = given
         s = np.array([float(initial[path][0]) for path in reduced.entropies])
         return q, self._rates_of(q), s
 
@@ -188,6 +188,7 @@ class PaperStates:
         if not any(map(np.any, momenta.values())):
             return rates
         twists: dict[int, Array] = {-1: np.zeros(6)}
+        roots = _roots(tables.inertia)  # what hardly has inertia knows little of its twist
         for i, momentum in momenta.items():
             twists[i] = np.linalg.solve(tables.inertia[i], momentum)
             columns: list[Array] = []
@@ -201,7 +202,7 @@ class PaperStates:
                 carried = carried @ SE3.adjoint(SE3.inverse(inner))
                 here = int(tables.parent[here])
             own = twists[i] - carried @ twists[here]
-            root = _root(tables.inertia[i])  # what hardly has inertia knows little of its twist
+            root = roots[i]
             rates[freedoms] = least_squares(root @ np.column_stack(columns), root @ own)
         return rates
 
@@ -216,7 +217,7 @@ class PaperStates:
         return SE3.inverse(ahead), -SE3.adjoint(there) @ pair.basis
 
 
-def _root(inertia: Array) -> Array:
-    """A symmetric root (6, 6) of an inertia, its size taken where it is negative."""
-    moments, axes = symmetric_eigen(inertia)
-    return (axes * np.sqrt(np.abs(moments))) @ axes.T
+def _roots(inertias: Array) -> Array:
+    """Symmetric roots (links, 6, 6) of inertias, their sizes taken where they are negative."""
+    moments, axes = symmetric_eigen(inertias)
+    return (axes * np.sqrt(np.abs(moments))[:, None]) @ axes.mT

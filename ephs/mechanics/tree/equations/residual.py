@@ -93,8 +93,6 @@ class Residual:
 
     Parameters
     ----------
-    gravity
-        (3,) in world axes.
     scal
         (h, θ₀, π₀), as the components' kernels take it.
     supply
@@ -113,13 +111,10 @@ class Residual:
         (rows,) of prescribed joints, then of loops, in the metric that `assemble` made last: zeros, where M is regular.
     """
 
-    def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
-        t, whole = reduced.tables, whole_of(reduced, gravity)
-        self._bodies, self._ground, self._frames = (
-            whole.bodies,
-            quaternion_to_matrix(whole.ground[:4]),
-            whole.body_frame,
-        )
+    def __init__(self, reduced: Reduced, scal: Array, supply: Array) -> None:
+        t, whole = reduced.tables, whole_of(reduced)
+        self._link, self._frames = whole.found.link, whole.body_frame
+        self._ground = quaternion_to_matrix(whole.found.ground[:4])
         records, joints = whole.records, whole.tables["cut"].reshape(-1, Cut.integer_width)
         self.program = residuals(records.kind, tuple(sorted({*whole.kinds, *(ALL if whole.usual else ())})))
         self.counts: list[int] = [*joints[joints[:, 2] != TIE, 8].tolist(), *[1] * len(reduced.attaching.ties)]
@@ -240,19 +235,19 @@ class Residual:
 
     def pose(self, body: int) -> Array:
         """(7,) of a body in the world, where `place` has been."""
-        place, frame = self.places[self._bodies.link[body]], self._frames[body]
+        place, frame = self.places[self._link[body]], self._frames[body]
         turn = self._ground.T @ place[:9].reshape(3, 3)
         at = self._ground.T @ place[9:12] + turn @ frame[9:]
         return np.concatenate([matrix_to_quaternion(turn @ frame[:9].reshape(3, 3)), at])
 
     def link(self, body: int) -> int:
         """Number of a body's link, −1 for the ground."""
-        return self._bodies.link[body]
+        return self._link[body]
 
     def twist(self, body: int) -> Array:
         """(6,) of a body in its frame, where `place` has been."""
         at = LinkPlace.twist.offset
-        return self.inside(body, self._seen(body, self.places[self._bodies.link[body], at : at + 6]))
+        return self.inside(body, self._seen(body, self.places[self._link[body], at : at + 6]))
 
     def twists(self, body: int) -> Array:
         """(6, n) a body's twist by the tree's rates, where `place` has been."""
@@ -264,7 +259,7 @@ class Residual:
 
     def _seen(self, body: int, twist: Array) -> Array:
         """(…, 6) twists of a body's link in the link's axes, from those in world axes."""
-        turn = self.places[self._bodies.link[body], :9].reshape(3, 3)
+        turn = self.places[self._link[body], :9].reshape(3, 3)
         return np.concatenate([twist[..., :3] @ turn, twist[..., 3:] @ turn], axis=-1)
 
     def inside(self, body: int, twist: Array) -> Array:

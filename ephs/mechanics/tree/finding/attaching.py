@@ -12,7 +12,7 @@ from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.parts import Parts
 from ephs.mechanics.tree.finding.spanning import Edge
-from ephs.mechanics.tree.finding.tables import SPRING, MechanismTables
+from ephs.mechanics.tree.finding.tables import MechanismTables
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.descriptor.descriptor import ComponentSlot
@@ -89,7 +89,7 @@ def makers_of(components: Sequence[ComponentSlot], network: Network) -> tuple[tu
 def attaching_of(
     components: Sequence[ComponentSlot],
     parts: Parts,
-    edges: Sequence[Edge],
+    joints: Sequence[Edge],
     tables: MechanismTables,
     stored: Sequence[Path],
     flows: tuple[Index, ...],
@@ -102,11 +102,10 @@ def attaching_of(
     Unplaced
         A component reads states that have no place.
     """
-    network, moving = parts.network, [i for i in range(len(edges)) if tables.kind[i] != SPRING]
-    at = {id(edges[i]): int(tables.r_at[i]) for i in moving}
+    network = parts.network
+    at = {id(edge): first for edge, first in zip(joints, tables.r_at.tolist(), strict=False)}
     known = {path: ([k], [k]) for k, path in enumerate(stored)}
-    for i in moving:
-        edge = edges[i]
+    for i, edge in enumerate(joints):
         if edge.path is not None and edge.state is not None:
             q, r = int(tables.q_at[i]), int(tables.r_at[i])
             known[edge.state] = (
@@ -120,7 +119,7 @@ def attaching_of(
                 raise Unplaced(components[one.component].path, f"reads {path}, which is neither attached nor a joint's")
         for k, out in enumerate((reads, varies)):
             out.append(np.array([place for path in one.reads for place in known[path][k]], dtype=np.int64))
-    number = {id(edge): i for i, edge in enumerate(edges)}
+    number = {id(edge): i for i, edge in enumerate(joints)}
     ties: list[RateRelation] = []
     for tie in network.ties:
         terms = [(*network.rates[place], ratio) for place, ratio in tie.terms]

@@ -85,7 +85,7 @@ class _Contraction:
         """Give the junctions of a component their columns."""
         slot = self.wiring.components[number]
         for port, _, quantity in slot.primitive.bundle.items():
-            junction = self.wiring.ports(number)[str(port)]
+            junction = self.wiring.ports[number][str(port)]
             if reason := self._refuse(junction):
                 raise self._fault(number, reason)
             for k in range(quantity.space.dim):
@@ -114,7 +114,7 @@ class _Contraction:
 
     def _places(self, number: int) -> list[int]:
         """Columns of a component's efforts."""
-        ports = self.wiring.ports(number)
+        ports = self.wiring.ports[number]
         return [
             self.column[ports[str(port)], k]
             for port, _, quantity in self._primitive(number).bundle.items()
@@ -281,7 +281,7 @@ class _Contraction:
         for port, where, quantity in slot.primitive.bundle.items():
             if quantity.kind != "entropy" or not isinstance(slot.primitive, Irreversible):
                 continue
-            junction = self.wiring.ports(number)[str(port)]
+            junction = self.wiring.ports[number][str(port)]
             stored = self.storage.get(self.column[junction, 0])
             taken = self.nodes[junction] if junction in self.nodes else taking[stored[1].path] if stored else -1
             heated.append((where.start, taken))

@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.tree.finding.roles import Role, Roles, offset_of
+from ephs.mechanics.tree.finding.roles import Role, offset_of, role_of
 from ephs.mechanics.tree.finding.wiring import Incidence
 from ephs.operad import Path, quantity
 from ephs.semantics.bundles.bundle import Array
@@ -132,15 +132,15 @@ class Frames:
 
 def frames_of(descriptor: Descriptor) -> Frames:
     """The links and joints of a flat system."""
-    return once(descriptor, "frames", lambda: _Finder(Incidence.of(descriptor)).found())
+    return once(descriptor, "frames", lambda: _Finder(descriptor).found())
 
 
 @final
 class _Finder:
-    def __init__(self, wiring: Incidence) -> None:
-        roles = Roles()
-        self.wiring = wiring
-        self.roles = tuple(roles.of(slot.primitive) for slot in wiring.components)
+    def __init__(self, descriptor: Descriptor) -> None:
+        self.wiring, n = Incidence.of(descriptor), descriptor.numbering
+        roles = [role_of(primitive) for primitive in n.primitives]
+        self.roles = tuple(roles[i] for i in n.primitive.tolist())
         self.placed: set[int] = set()
         self.faults: list[Unplaced] = []
         self.frames: dict[int, Frame] = {}
@@ -151,13 +151,13 @@ class _Finder:
         self._of_joints = Counter(map(self._around, self._with(Role.JOINT)))
         self._beside: dict[int, list[tuple[int, int, bool]]] = {}
         for number in self._with(Role.OFFSET):
-            outer, inner = wiring.ports(number).values()
+            outer, inner = self.wiring.ports[number].values()
             self._beside.setdefault(outer, []).append((number, inner, True))
             self._beside.setdefault(inner, []).append((number, outer, False))
 
     def found(self) -> Frames:
         for number in self._with(Role.GROUND):
-            self._carry(next(iter(self.wiring.ports(number).values())), GROUND, number)
+            self._carry(next(iter(self.wiring.ports[number].values())), GROUND, number)
         bodies: set[int] = set()
         for number, role in enumerate(self.roles):
             if role in (Role.KINETIC, Role.COUPLING, Role.GYROSCOPIC):
@@ -169,7 +169,7 @@ class _Finder:
         relations = self._with(Role.JOINT)
         for number in relations:
             for port in ("p_j1", "p_j2"):
-                self._bare(self.wiring.ports(number)[port], number)
+                self._bare(self.wiring.ports[number][port], number)
         joints = tuple(joint for number in relations if (joint := self._joint(number)) is not None)
         self.placed |= set(self._with(Role.GROUND)) | set(self._with(Role.OFFSET))
         return Frames(
@@ -184,7 +184,7 @@ class _Finder:
         slot = self.wiring.components[number]
         for port, _, of in slot.primitive.bundle.items():
             if of == quantity.body_momentum:
-                return self.wiring.ports(number)[str(port)]
+                return self.wiring.ports[number][str(port)]
         return None
 
     def _carry(self, junction: int, link: int, number: int) -> None:
@@ -211,7 +211,7 @@ class _Finder:
         """The body whose momentum a junction is."""
         inertia, potential, pose, momentum, turning = np.zeros((6, 6)), -1, None, None, None
         mine: list[int] = []
-        for number, port in self.wiring.on(junction):
+        for number, port in self.wiring.on[junction]:
             role, slot = self.roles[number], self.wiring.components[number]
             if role is Role.KINETIC:
                 key = id(slot.primitive.kernel), id(slot.primitive.parameters)
@@ -225,7 +225,7 @@ class _Finder:
             elif role is Role.GYROSCOPIC:
                 turning = number
             elif role is Role.COUPLING:
-                (at,) = (j for p, j in self.wiring.ports(number).items() if p != port)
+                (at,) = (j for p, j in self.wiring.ports[number].items() if p != port)
                 stored = self.wiring.stored(at)
                 if pose is not None or stored is None or self.roles[stored[0]] is not Role.POSE:
                     self._fault(number, "couples a body to no pose, or to a second one")
@@ -256,11 +256,11 @@ class _Finder:
 
     def _joint(self, number: int) -> LinkJoint | None:
         """The joint of a relation; None where it is not whole."""
-        wiring, ports = self.wiring, self.wiring.ports(number)
+        wiring, ports = self.wiring, self.wiring.ports[number]
         state, rate = wiring.components[number].reads[0], ports["p_r"]
         for other, port in wiring.neighbours(rate, number):
             if self.roles[other] is Role.COUPLING:
-                (at,) = (j for p, j in wiring.ports(other).items() if p != port)
+                (at,) = (j for p, j in wiring.ports[other].items() if p != port)
                 stored = wiring.stored(at)
                 known = stored is not None and self.roles[stored[0]] in (Role.RELATIVE, Role.SEVERAL)
                 if stored is not None and known and stored[1].path == state.path:

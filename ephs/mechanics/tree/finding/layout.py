@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.mechanics.tree.finding.mechanism import Edge, Reduced
-from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
@@ -70,8 +69,8 @@ class Layout:
         t = reduced.tables
         taken = {edge.name for edge in reduced.edges if edge.name}
         edges: dict[str, list[tuple[int, Edge]]] = {}
-        for i, edge in enumerate(reduced.edges):
-            if t.kind[i] != SPRING and i not in reduced.spans:
+        for i, edge in enumerate(reduced.joints):
+            if i not in reduced.spans:
                 edges.setdefault(edge.name or _free_name(reduced, i, taken), []).append((i, edge))
         for parts in edges.values():
             parts.sort(key=lambda part: part[1].freedoms.start)
@@ -79,20 +78,19 @@ class Layout:
         def places(at: Index, size: Index, parts: list[tuple[int, Edge]]) -> Index:
             return np.concatenate([np.arange(at[i], at[i] + size[i]) for i, _ in parts]).astype(np.int64)
 
-        dims = [int(t.dim[i]) for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
         return Layout(
             tuple(edges),
             MappingProxyType({name: places(t.r_at, t.dim, parts) for name, parts in edges.items()}),
             MappingProxyType({name: places(t.q_at, t.q_size, parts) for name, parts in edges.items()}),
             reduced.entropies,
             reduced.freedoms,
-            sum(dims),
+            int(t.dim[: len(reduced.joints)].sum()),
             MappingProxyType({name: tuple(parts) for name, parts in edges.items()}),
             MappingProxyType(
                 {
                     edge.state: slice(int(t.q_at[i]), int(t.q_at[i] + t.q_size[i]))
-                    for i, edge in enumerate(reduced.edges)
-                    if t.kind[i] != SPRING and edge.path is not None and edge.state is not None
+                    for i, edge in enumerate(reduced.joints)
+                    if edge.path is not None and edge.state is not None
                 }
             ),
             reduced.coordinates,

@@ -53,8 +53,10 @@ class Reduced:
         What stores s, in its order.
     unknowns
         How many numbers have to be found.
+    elements
+        Of the joints: where loops close or gears tie rates, the initial ones, else those of the identity.
     twists
-        Of each edge, (6, d): its degrees of freedom in the world, at the initial configuration.
+        Of each joint, (6, d): its degrees of freedom in the world at these elements.
     gravity
         (3,) in world axes, m/s².
     acting
@@ -72,6 +74,7 @@ class Reduced:
     made: tuple[Path, ...]
     nodes: Table[EntropyNode]
     unknowns: int
+    elements: tuple[Array, ...]
     twists: tuple[Array, ...]
     gravity: Array
     acting: tuple[WrenchPort, ...]
@@ -89,9 +92,14 @@ class Reduced:
         return edge.path or self.places[link].path or Path()
 
     @property
+    def joints(self) -> tuple[Edge, ...]:
+        """The edges that are joints: springs come behind them."""
+        return self.edges[: len(self.elements)]
+
+    @property
     def cut(self) -> tuple[Edge, ...]:
         """The joints at which loops are closed by constraints."""
-        return tuple(e for e, kind in zip(self.edges, self.tables.kind, strict=True) if kind == CUT)
+        return self.joints[self.links :]
 
     @property
     def gears(self) -> tuple[Path, ...]:
@@ -101,7 +109,7 @@ class Reduced:
     @property
     def coordinates(self) -> int:
         """Number of reals that store the joints' elements."""
-        return int(self.tables.q_size[self.tables.kind != SPRING].sum())
+        return int(self.tables.q_size[: len(self.elements)].sum())
 
     @property
     def freedoms(self) -> int:
@@ -112,7 +120,8 @@ class Reduced:
 def reduce_system(problem: Problem, model: Model) -> Reduced:
     """The tables of a problem's reduced form; the kernels of its components are those of the compiled model.
 
-    They are made once for each initial configuration, names, and prescribed motions, and kept with the descriptor form.
+    They are made once for all configurations of a tree, and for each one where loops close or gears tie rates: the
+    algebras that joints of a tree generate are the same in all of them.
 
     Raises
     ------
@@ -123,12 +132,23 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
     """
     if model.callbacks:
         return _reduced(problem, model)  # tables hold addresses of functions that go with their model
-    key = "reduced", model.reference, determined_by(problem)
+    placed = b"".join(map(bytes, _placed(problem).values()))
+    key = "reduced", model.reference, determined_by(problem), placed
     return once(problem.descriptor, key, lambda: _reduced(problem, model))
 
 
-def _reduced(problem: Problem, model: Model) -> Reduced:
+def _placed(problem: Problem) -> dict[Path | None, Array]:
+    """Initial elements of joints and poses of links, by their states; none where tables do not depend on them."""
     parts = parts_of(problem)
+    if len(parts.joints) == len(parts.links) and not parts.network.ties:
+        return {}
+    states = [edge.state for edge in (*parts.joints, *parts.spans)]
+    states += [link.pose.path for link in parts.links if link.pose is not None]
+    return {path: np.array(problem.initial[path]) for path in states if path is not None}
+
+
+def _reduced(problem: Problem, model: Model) -> Reduced:
+    parts, placed = parts_of(problem), _placed(problem)
     inertial = [parts.attached[parts.network.rates[one.rate][0]] for one in parts.network.inertias]
     tree, cut = spanning_tree(parts.joints, [link.light for link in parts.links], inertial)
     for one, edge in zip(parts.network.inertias, inertial, strict=True):
@@ -141,9 +161,11 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
         raise OptionError("motion", found, "one joint of each loop without prescribed motion, or the method natural")
     order = [child for _, child, _ in tree]
     edges = (*(edge for edge, _, _ in tree), *cut, *parts.forces)
-    poses = [None if link.pose is None else np.array(problem.initial[link.pose.path]) for link in parts.links]
-    frames = frames_of_joints(edges[: len(tree) + len(cut)], poses)
-    twists = twists_of(edges, frames, len(tree) + len(cut))
+    count = len(tree) + len(cut)
+    elements = [placed.get(edge.state, edge.pair.manifold.identity()) for edge in edges[:count]]
+    poses = [None if link.pose is None else placed.get(link.pose.path) for link in parts.links]
+    frames = frames_of_joints(edges[:count], elements, poses)
+    twists = twists_of(edges, frames)
     slots = problem.descriptor.components
     made, flows = makers_of(slots, parts.network)
     kinds = np.array([TREE] * len(tree) + [CUT] * len(cut) + [SPRING] * len(parts.forces), dtype=np.int64)
@@ -153,14 +175,12 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
     place = {body: i for i, body in enumerate(order)} | {GROUND: GROUND}
     acting = tuple(WrenchPort(one.port, Frame(place[one.frame.link], one.frame.offset)) for one in parts.acting)
     stored = (*parts.entropies, *(state.path for state in parts.network.states))
-    attaching = attaching_of(slots, parts, edges, mechanism, stored, flows, model.reference)
+    attaching = attaching_of(slots, parts, edges[:count], mechanism, stored, flows, model.reference)
     unknowns = 2 * int(mechanism.driven.size) + int(mechanism.rows.sum()) + len(attaching.ties)
-    count = len(tree) + len(cut)
     spans = frozenset(range(count - len(parts.spans), count))
     return Reduced(
         mechanism, edges, spans, names, tuple(links), stored, made, _nodes(model, parts), unknowns,
-        tuple(twists), parts.gravity, acting,
-        attaching,
+        tuple(elements), tuple(twists), parts.gravity, acting, attaching,
     )  # fmt: skip
 
 

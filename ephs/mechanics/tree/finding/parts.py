@@ -17,8 +17,6 @@ from ephs.mechanics.tree.finding.roles import Role
 from ephs.mechanics.tree.finding.spanning import Edge, islands
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.descriptor import Descriptor
-from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage
 from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.systems.kept import once
@@ -26,8 +24,6 @@ from ephs.solve.posing.motion_law import MotionLaw, PolynomialMotion
 from ephs.solve.posing.problem import Problem, Signal
 
 FREE = pair("free")
-MOVING = ("momentum", "entropy")
-"""Kinds of states that parts do not depend on."""
 OF_COORDINATES = ("no_potential", "pair_spring", "beam_spring")
 """Energies of a free joint that may lead to a body; with others it is a force between two frames."""
 
@@ -83,7 +79,7 @@ class Parts:
 
 
 def parts_of(problem: Problem) -> Parts:
-    """The parts of a problem's system; found once for each configuration, and kept with the descriptor form.
+    """The parts of a problem's system; found once for its prescribed motions and names, and kept with the descriptor.
 
     Raises
     ------
@@ -94,16 +90,9 @@ def parts_of(problem: Problem) -> Parts:
 
 
 def determined_by(problem: Problem) -> Hashable:
-    """Key of the parts of a system: the initial configuration, prescribed motions and names."""
-    d = problem.descriptor
+    """Key of the parts of a system: prescribed motions, and whether a scene, whose system has no other, names them."""
     motions = tuple((path, one.effort, _prescribed(one)) for path, one in problem.signals.items())
-    return problem.point[once(d, "placed", lambda: _placed(d))].tobytes(), motions, tuple(problem.names.items())
-
-
-def _placed(descriptor: Descriptor) -> Index:
-    """Places of all states but those of `MOVING`."""
-    placed = [np.arange(s.point.start, s.point.stop) for s in descriptor.states if s.quantity.kind not in MOVING]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *placed])
+    return motions, bool(problem.names)
 
 
 def _prescribed(signal: Signal) -> MotionLaw | bytes | None:
@@ -127,7 +116,7 @@ class _PartsReader:
         self._rate = {joint.state.path: joint.rate for joint in self.found.joints}
         for number, role in enumerate(self.roles):
             if role in (Role.HEAT, Role.ENVIRONMENT) and self._booked(number):
-                self.entropy[next(iter(self.wiring.ports(number).values()))] = len(self.entropies)
+                self.entropy[next(iter(self.wiring.ports[number].values()))] = len(self.entropies)
                 self.entropies[self.wiring.components[number].reads[0].path] = number
                 self.placed.add(number)
 
@@ -164,7 +153,7 @@ class _PartsReader:
 
     def _booked(self, number: int) -> bool:
         """Whether heat comes to a store of it by irreversible components only: then it is booked as energy."""
-        (junction,) = self.wiring.ports(number).values()
+        (junction,) = self.wiring.ports[number].values()
         others = (self.wiring.components[other].primitive for other, _ in self.wiring.neighbours(junction, number))
         return junction not in self.wiring.outer and all(isinstance(other, Irreversible) for other in others)
 
@@ -200,7 +189,7 @@ class _PartsReader:
         """Why nothing can be attached to a junction; None where it can."""
         if junction in self.found.frames:
             return "acts on the twist of a body; a joint's rate can be acted on"
-        on = {self.roles[number] for number, _ in self.wiring.on(junction)}
+        on = {self.roles[number] for number, _ in self.wiring.on[junction]}
         if on & {Role.POSE, Role.RELATIVE, Role.KINETIC, Role.JOINT} and junction not in self.rates:
             return "acts on the state of a body or a joint; a joint's rate can be acted on"
         return None
@@ -219,20 +208,20 @@ class _PartsReader:
         for number, _ in self.wiring.neighbours(joint.rate, joint.relation):
             if friction >= 0 or not self._resists(number, joint):
                 continue
-            *_, hot = self.wiring.ports(number).values()
+            *_, hot = self.wiring.ports[number].values()
             friction, heat = number, self.entropy[hot]
             self.placed.add(number)
         port = self.wiring.outer.get(joint.rate)
         return Edge(
             name, joint.path, joint.first.link, joint.second.link, joint.first.offset, joint.second.offset, joint.pair,
-            None if port is None else self._motion(port, d), np.array(self.problem.initial[joint.state.path]),
+            None if port is None else self._motion(port, d),
             slice(start, start + d), joint.state.path, port, joint.potential, friction, heat, self._place(joint),
         )  # fmt: skip
 
     def _resists(self, number: int, joint: LinkJoint) -> bool:
         """Whether a component is friction of a joint, or of all those whose relative poses one potential stores."""
         read = [state.path for state in self.wiring.components[number].reads]
-        *rates, hot = self.wiring.ports(number).values()
+        *rates, hot = self.wiring.ports[number].values()
         if self.roles[number] is Role.FRICTION:
             own = set(read) <= {joint.state.path}
         else:
@@ -290,9 +279,8 @@ class _PartsReader:
     def _free(self, link: int, name: str) -> Edge:
         """The free joint of a link that nothing else ties to the ground."""
         pose, unit = self.found.links[link].pose, SE3.identity()
-        start = unit if pose is None else np.array(self.problem.initial[pose.path])
         state = None if pose is None else pose.path
-        return Edge(name, None, -1, link, unit, unit, FREE, None, start, slice(0, 6), state, None, -1, -1, -1)
+        return Edge(name, None, -1, link, unit, unit, FREE, None, slice(0, 6), state, None, -1, -1, -1)
 
     # ---- forces ------------------------------------------------------------------------------------------------
 
@@ -325,7 +313,7 @@ class _PartsReader:
             if role is not Role.DRAG:
                 continue
             slot = self.wiring.components[number]
-            frame = self.found.frames[next(iter(self.wiring.ports(number).values()))]
+            frame = self.found.frames[next(iter(self.wiring.ports[number].values()))]
             pose = None if frame.link < 0 else self.found.links[frame.link].pose
             at_centre = np.array_equal(frame.offset, SE3.identity())
             if slot.reads and not (at_centre and pose is not None and slot.reads[0].path == pose.path):
@@ -337,15 +325,15 @@ class _PartsReader:
         path = self.wiring.components[max(spring, friction)].path
         unit = SE3.identity()
         return Edge(
-            str(path), path, -1, frame.link, unit, frame.offset, FREE, None, unit, slice(0, 6), None, None, spring,
-            friction, heat,
+            str(path), path, -1, frame.link, unit, frame.offset, FREE, None, slice(0, 6), None, None, spring, friction,
+            heat,
         )  # fmt: skip
 
     # ---- heat and ports ----------------------------------------------------------------------------------------
 
     def _heat(self, number: int) -> int:
         """Entropy of the node that a component heats."""
-        *_, junction = self.wiring.ports(number).values()
+        *_, junction = self.wiring.ports[number].values()
         if junction not in self.entropy:
             raise Unplaced(self.wiring.components[number].path, "heats what is no store of heat")
         return self.entropy[junction]
@@ -353,7 +341,7 @@ class _PartsReader:
     def _conduction(self) -> Iterator[tuple[int, int, int]]:
         for number, role in enumerate(self.roles):
             if role is Role.CONDUCTION:
-                ends = [self.entropy.get(junction, -1) for junction in self.wiring.ports(number).values()]
+                ends = [self.entropy.get(junction, -1) for junction in self.wiring.ports[number].values()]
                 if -1 in ends:
                     continue
                 self.placed.add(number)

@@ -1,7 +1,6 @@
 """The part that a primitive can play in a mechanism, read from its structure."""
 
 from enum import Enum, auto
-from typing import final
 
 import numpy as np
 
@@ -50,28 +49,14 @@ class Role(Enum):
     """Components that may be attached."""
 
 
-@final
-class Roles:
-    """Roles of primitives; each primitive is looked at once."""
-
-    def __init__(self) -> None:
-        self._known: dict[int, Role] = {}
-
-    def of(self, primitive: Primitive) -> Role:
-        """The role of a primitive."""
-        found = self._known.get(id(primitive))
-        if found is None:
-            found = self._known[id(primitive)] = _role(primitive)
-        return found
-
-
 def offset_of(primitive: Primitive) -> np.ndarray | None:
     """(7,) the pose of the frame that a frame change leads to, in the frame of its first port; None of others."""
     kernel = primitive.kernel
     return np.array(kernel.parameters) if kernel is not None and kernel.name == "frame_change" else None
 
 
-def _role(primitive: Primitive) -> Role:
+def role_of(primitive: Primitive) -> Role:
+    """The role of a primitive."""
     quantities = [q for _, _, q in primitive.bundle.items()]
     kinds, on_bodies = [q.kind for q in quantities], [q == quantity.body_momentum for q in quantities]
     if isinstance(primitive, Storage):

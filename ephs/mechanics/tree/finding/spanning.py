@@ -30,8 +30,6 @@ class Edge:
         Numbers of the links, −1 for the ground.
     motion
         The motion law of a single degree of freedom, or None.
-    coordinate
-        Initial element of the pair's group.
     freedoms
         Which of the joint's degrees of freedom this edge has: a universal joint is two edges.
     state
@@ -52,7 +50,6 @@ class Edge:
     offset2: Array
     pair: Pair
     motion: MotionLaw | None
-    coordinate: Array
     freedoms: slice
     state: Path | None
     port: Path | None
@@ -62,8 +59,8 @@ class Edge:
     place: int = 0
 
 
-def frames_of_joints(edges: Sequence[Edge], poses: Sequence[Array | None]) -> list[Array]:
-    """The pose in the world of each joint's frame on body 2, where bodies have these poses.
+def frames_of_joints(edges: Sequence[Edge], elements: Sequence[Array], poses: Sequence[Array | None]) -> list[Array]:
+    """The pose in the world of each joint's frame on body 2, where joints have these elements and bodies these poses.
 
     A frame without one follows from the other body of a joint.
     """
@@ -75,7 +72,7 @@ def frames_of_joints(edges: Sequence[Edge], poses: Sequence[Array | None]) -> li
         for _ in range(before):
             i = left.popleft()
             edge = edges[i]
-            relative = edge.pair.include(edge.coordinate)
+            relative = edge.pair.include(elements[i])
             if edge.body2 in known:
                 out[i] = edge.offset2 if edge.body2 < 0 else SE3.compose(known[edge.body2], edge.offset2)
             elif edge.body1 in known:
@@ -93,10 +90,9 @@ def frames_of_joints(edges: Sequence[Edge], poses: Sequence[Array | None]) -> li
     return [out[i] for i in range(len(edges))]
 
 
-def twists_of(edges: Sequence[Edge], frames: Sequence[Array], joints: int) -> list[Array]:
-    """The degrees of freedom of all joints in the world, where joints have these frames; none of springs."""
-    out = [SE3.adjoint(frame) @ edge.pair.basis for edge, frame in zip(edges[:joints], frames, strict=True)]
-    return out + [np.zeros((6, 0))] * (len(edges) - joints)
+def twists_of(edges: Sequence[Edge], frames: Sequence[Array]) -> list[Array]:
+    """The degrees of freedom of joints in the world, where these have such frames; springs come behind them."""
+    return [SE3.adjoint(frame) @ edge.pair.basis for edge, frame in zip(edges, frames, strict=False)]
 
 
 def _depths(start: int, edges: Sequence[Edge]) -> dict[int, int]:

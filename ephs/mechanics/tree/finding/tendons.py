@@ -39,7 +39,7 @@ def tendon_lengths(frames: Frames, state: Mapping[Path, Array]) -> Iterator[tupl
     whole: dict[int, Array] = {}
     for number, slot in enumerate(wiring.components):
         if slot.primitive.kernel is not None and slot.primitive.kernel.name == "point_stretch":
-            at = wiring.ports(number)["e"]
+            at = wiring.ports[number]["e"]
             whole[at] = whole.get(at, 0.0) + np.linalg.norm(state[slot.reads[0].path][..., -3:], axis=-1)
     for at, length in whole.items():
         for rate, turn in _coupled(wiring, at):
@@ -51,8 +51,8 @@ def tendon_lengths(frames: Frames, state: Mapping[Path, Array]) -> Iterator[tupl
 
 def _coupled(wiring: Incidence, junction: int) -> Iterator[tuple[int, float]]:
     """Other junctions of constant gyrators of two scalar ports on a junction, each with its flow by the effort here."""
-    for number, port in wiring.on(junction):
-        primitive, ports = wiring.components[number].primitive, wiring.ports(number)
+    for number, port in wiring.on[junction]:
+        primitive, ports = wiring.components[number].primitive, wiring.ports[number]
         if isinstance(primitive, Reversible) and not primitive.reads and primitive.bundle.size == 2 == len(ports):
             skew, rows = primitive.structure({})
             (other,) = (name for name in ports if name != port)

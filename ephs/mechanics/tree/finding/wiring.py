@@ -4,11 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
 from ephs.operad import Path
 from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, StateSlot
-from ephs.semantics.descriptor.numbering import starts
 from ephs.semantics.primitives.primitives import Storage
 
 
@@ -19,52 +16,35 @@ class Incidence:
 
     Parameters
     ----------
-    names
-        (components,) ports of each.
-    wires, first
-        Junctions of all ports, one component after the other, and where those of each begin.
-    owners, begin
-        Components with each port on a junction, one junction after the other, and where those of each begin.
+    ports
+        (components,) ports of each, each with its junction.
+    on
+        (junctions,) the components with a port there, each with the port.
     outer
         Junction -> the outer port that it is.
     """
 
     components: tuple[ComponentSlot, ...]
-    names: tuple[tuple[str, ...], ...]
-    wires: list[int]
-    first: list[int]
-    owners: list[tuple[int, str]]
-    begin: list[int]
+    ports: tuple[dict[str, int], ...]
+    on: tuple[list[tuple[int, str]], ...]
     outer: dict[int, Path]
 
     @staticmethod
     def of(descriptor: Descriptor) -> "Incidence":
         """The incidence of a descriptor's system."""
-        n, components = descriptor.numbering, descriptor.components
-        each = [tuple(map(str, primitive.bundle.ports)) for primitive in n.primitives]
-        names = tuple(each[i] for i in n.primitive.tolist())
-        count = np.array([len(ports) for ports in each], dtype=np.int64)[n.primitive]
-        every = [(number, port) for number, ports in enumerate(names) for port in ports]
-        owners = [every[i] for i in np.argsort(n.wires, kind="stable").tolist()]
-        begin = np.append(0, np.cumsum(np.bincount(n.wires, minlength=n.junctions.size))).tolist()
+        n, wires = descriptor.numbering, iter(descriptor.numbering.wires.tolist())
+        names = [tuple(map(str, primitive.bundle.ports)) for primitive in n.primitives]
+        ports = tuple({port: next(wires) for port in names[i]} for i in n.primitive.tolist())
+        on: tuple[list[tuple[int, str]], ...] = tuple([] for _ in range(n.junctions.size))
+        for number, own in enumerate(ports):
+            for port, junction in own.items():
+                on[junction].append((number, port))
         outer = [slot.path for slot in descriptor.outer]
-        return Incidence(
-            components, names, n.wires.tolist(), starts(count).tolist(), owners, begin,
-            dict(zip(n.outer.tolist(), outer, strict=True)),
-        )  # fmt: skip
-
-    def ports(self, number: int) -> dict[str, int]:
-        """Ports of a component, each with its junction."""
-        names, at = self.names[number], self.first[number]
-        return dict(zip(names, self.wires[at : at + len(names)], strict=True))
-
-    def on(self, junction: int) -> list[tuple[int, str]]:
-        """The components with a port on a junction, each with the port."""
-        return self.owners[self.begin[junction] : self.begin[junction + 1]]
+        return Incidence(descriptor.components, ports, on, dict(zip(n.outer.tolist(), outer, strict=True)))
 
     def stored(self, junction: int) -> tuple[int, StateSlot] | None:
         """The storage on a junction with its state there; None where nothing is stored."""
-        for number, port in self.on(junction):
+        for number, port in self.on[junction]:
             slot = self.components[number]
             if isinstance(slot.primitive, Storage):
                 return number, slot.reads[list(slot.primitive.bundle.ports).index(Path.of(port))]
@@ -72,4 +52,4 @@ class Incidence:
 
     def neighbours(self, junction: int, besides: int) -> Iterator[tuple[int, str]]:
         """The components on a junction with their ports there, but for one component."""
-        return ((number, port) for number, port in self.on(junction) if number != besides)
+        return ((number, port) for number, port in self.on[junction] if number != besides)
