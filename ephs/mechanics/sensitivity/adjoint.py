@@ -13,7 +13,7 @@ from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
 from ephs.mechanics.sensitivity.family import ParameterFamily, differentiated, relation_of
-from ephs.mechanics.sensitivity.sensitivity import ATOL, RTOL
+from ephs.mechanics.sensitivity.sensitivity import ATOL, RTOL, steps_of
 from ephs.mechanics.tree.engine.adjoints import StepAdjoint
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
@@ -101,7 +101,7 @@ def gradient(
         raise OptionError("times", times, f"ascending times after {t0:g} s")
     if not isinstance(weights, Mapping) or not weights:
         raise OptionError("weights", weights, "a joint's reading and its weights at least")
-    control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
+    control = steps_of(step, rtol, atol)
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": method, "inputs": inputs}
     grid = np.union1d(simulate(model, float(wanted[-1]), **run, **control).t, wanted)
     with differentiated(parameters, t0):

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from threading import Lock
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -18,6 +19,7 @@ from ephs.solve.methods.own import Method
 from ephs.solve.posing.errors import OptionError, failing_at, nearest_of
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
+from ephs.solve.running.control import Tolerance
 from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
@@ -157,7 +159,7 @@ def sensitivity(
     name = _method(method, step)
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": name, "inputs": inputs, "reference": reference}
     family = ParameterFamily(model, parameters, initial, inputs, reference, joints=name != "natural")
-    control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
+    control = steps_of(step, rtol, atol)
     times = None if save_at is None else numbers_of(save_at)
     if save_at is not None and times is None:
         raise OptionError("save_at", save_at, "ascending times in s")
@@ -172,6 +174,13 @@ def sensitivity(
         raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
     with differentiated(parameters, float(grid[0])):
         return _along(family, name, grid, times, chosen=step is None)
+
+
+def steps_of(step: float | None, rtol: float, atol: float) -> dict[str, Any]:
+    """Options of the run whose steps are kept; tolerances have no part in constant ones, but are checked."""
+    for name, given in (("rtol", rtol), ("atol", atol)):
+        Tolerance.of(name, given, 0.0)
+    return {"rtol": rtol, "atol": atol} if step is None else {"step": step}
 
 
 def _method(method: str | Method, step: float | None) -> str | Method:
@@ -213,10 +222,12 @@ def _along(
             point = stepper.step(point, after - before)
         if after in wanted:
             kept.append(point)
-    solution = replay(family.problem, wanted, [stepper.row(p) for p in kept], name)
+    alone = Lock()  # neighbours are evaluated in memory of their own problem
+    solution = replay(family.problem, wanted, stepper.rows(kept), name)
 
     def neighbour(number: int, model: float, states: float) -> Solution:
-        problem, rows = stepper.beside(number, model, states, kept)
+        with alone:
+            problem, rows = stepper.beside(number, model, states, kept)
         return replay(problem, wanted, rows, name)
 
     sizes = [max((stepper.size(p, j) for p in kept), default=0.0) for j in range(len(family.parameters))]
