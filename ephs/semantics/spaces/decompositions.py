@@ -118,7 +118,7 @@ def conditioned_eigen(matrix: Any) -> tuple[Any, Any, Any]:
         la = _scipy()
         if not np.isfinite(a).all():
             raise np.linalg.LinAlgError
-        even, (scale, _) = la.matrix_balance(a, permute=False, separate=True)
+        even, _, _, scale, _ = la.lapack.dgebal(a, permute=0, scale=1)
         values, left, right = la.eig(even, left=True)
         with np.errstate(divide="ignore"):
             change = np.linalg.norm(even) / np.abs(np.sum(left.conj() * right, axis=0))

@@ -171,6 +171,14 @@ def test_what_cannot_be_is_named(keys, what):
         ephs.linearize(MASS, **keys)
 
 
+@pytest.mark.parametrize("s", [2.0j, "2", np.nan, [1.0j], None])
+def test_where_there_is_no_response_is_said(s):
+    found = ephs.linearize(oscillator(k=4.0, m=1.0), inputs={"p": {"flow": 0.0}})
+    assert found.transfer(1.0j)[0, 0] == pytest.approx(1.0j / 3.0, rel=1e-12)
+    with pytest.raises(ephs.OptionError, match="s is"):
+        found.transfer(s)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_slow_modes_beside_fast_ones_are_those_of_their_own(seed):
     """λ² + 2 ζ ω λ + ω² = 0 of each oscillator, ω by up to ten decades apart; a free one has two zeros."""
