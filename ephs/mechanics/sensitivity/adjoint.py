@@ -21,7 +21,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.system import System
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.own import Method
-from ephs.solve.posing.errors import OptionError, failing_at
+from ephs.solve.posing.errors import OptionError, failing_at, number_of
 from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
@@ -90,6 +90,7 @@ def gradient(
     SimulationError
         The run failed.
     """
+    t0 = number_of("t0", t0)
     if not isinstance(method, Method) and method not in ("rk54", "rk87"):
         raise OptionError("method", method, "rk54, rk87 or an ephs.Method")
     family = ParameterFamily(model, parameters, initial, inputs, None, joints=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.runs.signals import numbers_of
+from ephs.mechanics.runs.signals import times_of
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.family import CENTRAL, Parameter, ParameterFamily, difference, differentiated
@@ -16,7 +16,7 @@ from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.systems.system import System
 from ephs.solve.methods.own import Method
-from ephs.solve.posing.errors import OptionError, failing_at, nearest_of
+from ephs.solve.posing.errors import OptionError, failing_at, nearest_of, number_of
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.control import Tolerance
@@ -160,18 +160,10 @@ def sensitivity(
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": name, "inputs": inputs, "reference": reference}
     family = ParameterFamily(model, parameters, initial, inputs, reference, joints=name != "natural")
     control = steps_of(step, rtol, atol)
-    times = None if save_at is None else numbers_of(save_at)
-    if save_at is not None and times is None:
-        raise OptionError("save_at", save_at, "ascending times in s")
+    times = times_of(save_at, number_of("t0", t0), number_of("until", until))
+    if times is not None and not times.size:
+        raise OptionError("save_at", save_at, "at least one time in s")
     grid = simulate(model, until, **run, **control).t
-    if times is not None and not (
-        times.ndim == 1
-        and times.size
-        and np.all(np.diff(times) > 0.0)
-        and grid[0] <= times[0]
-        and times[-1] <= grid[-1]
-    ):
-        raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
     with differentiated(parameters, float(grid[0])):
         return _along(family, name, grid, times, chosen=step is None)
 
@@ -217,7 +209,7 @@ def _along(
     kept: list[Any] = [point] if wanted[0] == t0 else []
     for before, after in zip(grid[:-1].tolist(), grid[1:].tolist(), strict=True):
         with failing_at(before):
-            for when in wanted[(wanted > before) & (wanted < after)].tolist():
+            for when in wanted[(wanted - before) * (wanted - after) < 0.0].tolist():
                 kept.append(stepper.step(point, when - before))
             point = stepper.step(point, after - before)
         if after in wanted:
