@@ -202,7 +202,7 @@ class EnvironmentTask:
 
 @final
 class Environment(gymnasium.Env[Array, Array]):
-    """One environment: actions are forces on the inputs, constant over a period, in addition to the scene's own.
+    """One environment: actions are forces on the inputs, constant over a period, in place of the scene's drives there.
 
     An episode whose steps fail ends, and says why in ``info["status"]``.
     """
