@@ -7,14 +7,18 @@ from typing import Any, Final, final
 
 import gymnasium
 import numpy as np
+from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from ephs.exporting.image import image_of
 from ephs.exporting.module import Exported, exported
+from ephs.mechanics.runs.signals import numbers_of
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.parameters import varied
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.objects import compiled
+from ephs.solve.posing.errors import OptionError, count_of, number_of
 from ephs.solve.running.control import RTOL
 
 # Exported mechanisms running in this process: many instances with separate memory.
@@ -142,6 +146,10 @@ class EnvironmentTask:
     ------
     ExportError
         The scene, an input, an output or a parameter does not allow it.
+    OptionError
+        An option is no number, no function or no range.
+    SceneError
+        An end of a range is no number for its parameter.
     """
 
     def __init__(
@@ -151,11 +159,25 @@ class EnvironmentTask:
         parameters: Mapping[str, tuple[float, float]] | None = None, method: str = "rk54", rtol: float = RTOL,
         step: float | None = None,
     ) -> None:  # fmt: skip
-        self.reward, self.done, self.period, self.horizon = reward, done, period, horizon
-        self.ranges = np.array(list((parameters or {}).values()), dtype=float).reshape(-1, 2)
+        for key, function in (("reward", reward), ("done", done)):
+            if not callable(function):
+                raise OptionError(key, function, "a function")
+        self.reward, self.done, self.horizon = reward, done, count_of("horizon", horizon)
+        self.period = number_of("period", period)
+        if not 0.0 < self.period < np.inf:
+            raise OptionError("period", period, "a number of seconds > 0")
+        if not isinstance(parameters, Mapping | None):
+            raise OptionError("parameters", parameters, "paths with ranges (least, most)")
+        ranges = {path: numbers_of(pair) for path, pair in (parameters or {}).items()}
+        for path, pair in ranges.items():
+            if pair is None or pair.shape != (2,) or not (np.isfinite(pair).all() and pair[0] <= pair[1]):
+                raise OptionError(f"parameters[{path!r}]", (parameters or {})[path], "(least, most)")
+            for end in pair.tolist():
+                varied(scene, {path: end})
+        self.ranges = np.array(list(ranges.values())).reshape(-1, 2)
         image = image_of(
             scene, inputs=inputs, parameters=list(parameters or {}), method=method, rtol=rtol, step=step,
-            until=period * horizon,
+            until=self.period * self.horizon,
         )  # fmt: skip
         self.made: Exported = exported(image, "task")
         seen = self.made.chosen(outputs)
@@ -165,7 +187,10 @@ class EnvironmentTask:
             low, high = np.array([each.limits for each in self.made.inputs], dtype=float).reshape(-1, 2).T
             low, high = np.where(np.isfinite(low), low, -1.0), np.where(np.isfinite(high), high, 1.0)
         else:
-            high = np.broadcast_to(np.asarray(limits, dtype=float), (len(self.made.inputs),)).copy()
+            sizes, count = numbers_of(limits), len(self.made.inputs)
+            if sizes is None or sizes.shape not in ((1,), (count,)) or not np.all(sizes > 0.0):
+                raise OptionError("limits", limits, f"a number > 0, or {count}, one for each input")
+            high = np.broadcast_to(sizes, (count,)).copy()
             low = -high
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(seen),), dtype=np.float64)
@@ -177,7 +202,7 @@ class EnvironmentTask:
 
 @final
 class Environment(gymnasium.Env[Array, Array]):
-    """One environment: actions are forces on the inputs, constant over a period, in addition to the scene's own.
+    """One environment: actions are forces on the inputs, constant over a period, in place of the scene's drives there.
 
     An episode whose steps fail ends, and says why in ``info["status"]``.
     """
@@ -223,20 +248,26 @@ class Environments(VectorEnv[Array, Array, Any]):
         self._over = np.zeros(count, dtype=bool)
         self._status = np.zeros(count, dtype=np.int64)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
-        self._random = np.random.default_rng()
+        self._random = [np_random()[0] for _ in range(count)]
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin all episodes."""
-        self._random = np.random.default_rng([each or 0 for each in seed] if isinstance(seed, list) else seed)
+        """Begin all episodes. Each environment draws as one alone with its seed, the k-th of one seed with seed + k;
+        without a seed they draw on."""
+        seeds = (
+            seed if isinstance(seed, Sequence) else [None if seed is None else seed + k for k in range(self.num_envs)]
+        )
+        if len(seeds) != self.num_envs:
+            raise OptionError("seed", seed, f"one number, or {self.num_envs}")
+        self._random = [r if each is None else np_random(each)[0] for r, each in zip(self._random, seeds, strict=True)]
         for number in range(self.num_envs):
             self._begin(number)
         self._over[:] = False
         return self._run.outputs[:, self.task.places], {}
 
     def _begin(self, number: int) -> None:
-        self._run.start(number, self.task.drawn(self._random))
+        self._run.start(number, self.task.drawn(self._random[number]))
         self._counts[number] = self._status[number] = 0
         self._run.read(number)
 

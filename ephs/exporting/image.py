@@ -39,6 +39,7 @@ from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.system import System
 from ephs.solve.march.control import Proportional
 from ephs.solve.march.records import MarchControl
+from ephs.solve.posing.errors import OptionError, number_of
 from ephs.solve.posing.problem import Problem
 from ephs.solve.running.control import ATOL, RTOL, first_step
 from ephs.solve.running.stepping import Span
@@ -204,10 +205,17 @@ def image_of(
     ------
     ExportError
         The method has constant memory of another kind, an input has no place, or a contact or stop is hard.
+    OptionError
+        An option is no number, or no list of names.
     """
     if method not in METHODS:
         raise ExportError("method", found=method, expected=" or ".join(METHODS))
-
+    for key, paths in (("inputs", inputs), ("parameters", parameters)):
+        listed = isinstance(paths, Sequence) and not isinstance(paths, str)
+        if not listed or not all(isinstance(path, str) for path in paths) or len(set(paths)) < len(paths):
+            raise OptionError(key, paths, "names, each once, as a list")
+    if not 0.0 < number_of("until", until) < math.inf:
+        raise OptionError("until", until, "a number of seconds > 0")
     started = partial(_started, inputs=inputs, method=method, steps=(rtol, atol, step), until=until)
     found = started(model)
     for path in parameters:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ephs.exporting.errors import ExportError
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError
 
 NEAR = 0.25
 """Relative displacement of a parameter, of 1 where it is 0: above rounding and within ranges."""
@@ -63,7 +64,10 @@ def dependence(
     sizes = [each.size for each in arrays(start)]
 
     def numbers_at(shares: Array) -> Array:
-        found = arrays(dict(zip(names, (first + shares * moves).tolist(), strict=True)))
+        try:
+            found = arrays(dict(zip(names, (first + shares * moves).tolist(), strict=True)))
+        except StructureError as error:
+            raise ExportError("structure", found=", ".join(names)) from error
         if [each.size for each in found] != sizes:
             raise ExportError("structure", found=", ".join(names))
         return np.concatenate([np.zeros(0), *(each.ravel() for each in found)])

@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.show.diagrams.layout import place
 from ephs.show.diagrams.png import draw_placement
-from ephs.show.motions.motion import best_side, between_instants, film
+from ephs.show.motions.motion import best_side, poses_at
 from ephs.show.motions.still import draw_still
 from ephs.show.plots.curves import styled
 from ephs.show.shared.errors import ShowError
@@ -70,12 +70,6 @@ def _poses(sol: Any, at: float | None) -> tuple[dict[str, Any], Any]:
         span = f"one from {t[0]:g} to {t[-1]:g} s"
         raise ShowError("nothing", path=str(sol.name), found=f"time {time:g} s", expected=span)
     names = [name for name, _ in sol.outline.all_bodies()]
-    frames = film(sol, names, 30.0, None, most=60)
     places = [np.asarray(sol.body(name).position, dtype=float) for name in names]
-    still: dict[str, Any] = {}
-    for name, rows in frames.poses.items():
-        # the film has equidistant times and continuous quaternions
-        pose = np.array([between_instants(frames.times, np.array([time]), column)[0] for column in rows.T])
-        pose[:4] /= np.linalg.norm(pose[:4])
-        still[name] = pose
+    still = {name: rows[0] for name, rows in poses_at(sol, names, np.array([time])).items()}
     return still, best_side(np.concatenate(places)) if places else None

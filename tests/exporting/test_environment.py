@@ -74,6 +74,48 @@ def test_parameters_are_drawn_anew_for_each_episode(task):
     assert ends[0] == ends[1] != ends[2]
 
 
+@pytest.mark.parametrize("seed", [4, [7, None, 3]])
+def test_each_of_many_draws_as_one_alone_with_its_seed(task, seed):
+    """And goes on to draw without a seed; None leaves a generator as it is."""
+    many, ends = Environments(task, 3), []
+    many.reset(seed=11)
+    for given in (seed, None):
+        many.reset(seed=given)
+        for _ in range(5):
+            seen, *_ = many.step(np.full((3, 1), 0.2))
+        ends.append(seen)
+    for k in range(3):
+        env = Environment(task)
+        env.reset(seed=11 + k)
+        for given, end in zip((4 + k if seed == 4 else seed[k], None), ends, strict=True):
+            env.reset(seed=given)
+            for _ in range(5):
+                alone, *_ = env.step(np.array([0.2]))
+            assert alone.tolist() == end[k].tolist()
+    assert ends[0].tolist() != ends[1].tolist()
+    with pytest.raises(ephs.OptionError, match="seed is"):
+        many.reset(seed=[1])
+
+
+@pytest.mark.parametrize(
+    "option",
+    [{"limits": -1.0}, {"limits": np.nan}, {"limits": "wide"}, {"limits": [1.0, 2.0]}, {"period": 0.0},
+     {"period": "short"}, {"period": np.nan}, {"horizon": 0}, {"horizon": 1.5}, {"reward": 3.0}, {"done": 3.0},
+     {"parameters": ["bodies.rod.mass"]}, {"inputs": "joints.bearing"}, {"inputs": ["joints.bearing"] * 2},
+     *({"parameters": {"bodies.rod.mass": pair}} for pair in ((2.0, 1.0), (1.0, 2.0, 3.0, 4.0), 1.0, (1.0, np.nan)))],
+)  # fmt: skip
+def test_options_that_have_no_meaning_are_refused_by_name(option):
+    given = {"inputs": ["joints.bearing"], "reward": lambda *_: 0.0} | option
+    with pytest.raises(ephs.OptionError, match=next(iter(option))):
+        EnvironmentTask(shipped("slider-crank"), **given)
+
+
+def test_ranges_have_ends_that_a_scene_may_have():
+    given = {"inputs": ["joints.bearing"], "reward": lambda *_: 0.0, "parameters": {"bodies.rod.mass": (-1.0, 1.0)}}
+    with pytest.raises(ephs.SceneError, match=r"bodies\.rod\.mass"):
+        EnvironmentTask(shipped("slider-crank"), **given)
+
+
 def test_what_is_not_there_is_refused_by_name():
     scene = shipped("slider-crank")
     with pytest.raises(ephs.ExportError, match=r"joints\.no"):

@@ -9,19 +9,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import ephs
 from ephs.semantics.spaces.rotations import matrix_to_quaternion
 from ephs.show import ShowError, animate
+from ephs.show.beside import _poses
 from ephs.show.motions.motion import (
     between,
     equivalent_box,
     film,
     frame_all,
     point_of,
+    poses_at,
     rotate,
 )
 from ephs.show.motions.solids import solid_of
 from ephs.show.motions.symbols import add_body
+from tests.scenes import shipped
 from tests.show.conftest import Altered
+from tests.written import scene_of_text
 
 UNIT = st.floats(-1.0, 1.0)
 VECTORS = st.tuples(UNIT, UNIT, UNIT).map(np.array)
@@ -94,11 +99,84 @@ def test_frames_are_poses_on_the_way(crank):
 def test_a_quaternion_that_changes_its_sign_makes_no_jump(crank):
     body = crank.body("rod")
     signs = np.where(np.arange(len(crank.t)) % 3 == 0, -1.0, 1.0)[:, None]
-    flipped = SimpleNamespace(position=body.position, quaternion=body.quaternion * signs)
+    rates = {"velocity": body.velocity, "angular_velocity": body.angular_velocity}
+    flipped = SimpleNamespace(position=body.position, quaternion=body.quaternion * signs, **rates)
     turns, straight = (
         film(of, ["rod"], 30.0, None).poses["rod"][:, :4] for of in (Altered(crank, body=lambda _: flipped), crank)
     )
     assert np.abs(np.abs((turns * straight).sum(axis=1)) - 1.0).max() < 1e-12
+
+
+WHEEL = """
+format = 1
+name = "wheel"
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.wheel]
+mass = 1.0
+inertia = [0.1, 0.1, 0.2]
+[joints.axle]
+type = "revolute"
+bodies = ["ground", "wheel"]
+frame1 = {}
+frame2 = { position = [0.5, 0.0, 0.0] }
+coordinate = 0.3
+rate = 40.0
+"""
+
+
+BOUNCING = """
+format = 1
+name = "ball"
+[bodies.ball]
+mass = 1.0
+inertia = [4e-3, 4e-3, 4e-3]
+position = [0.0, 0.0, 0.3]
+[surfaces.ball]
+body = "ball"
+shape = { sphere = 0.1 }
+restitution = 0.5
+[surfaces.floor]
+body = "ground"
+shape = { plane = {} }
+"""
+
+
+@pytest.mark.parametrize("until", [2.0, -2.0])
+def test_a_fast_wheel_turns_between_instants_as_it_does(until):
+    """Eight whole turns and more from one instant to the next, after a start that is not zero."""
+    sol = ephs.simulate(scene_of_text(WHEEL), 3.0 + until, t0=3.0, save_at=3.0 + until * np.linspace(0.0, 1.0, 3))
+    frames = film(sol, ["wheel"], 30.0, None)
+    poses, angle = frames.poses["wheel"], 0.3 + 40.0 * (frames.times - 3.0)
+    assert len(frames.times) == 61 and abs(40.0 * until / 2.0) > 6.0 * math.pi
+    half = np.stack([np.cos(angle / 2.0), 0.0 * angle, 0.0 * angle, np.sin(angle / 2.0)], axis=1)
+    assert np.abs(np.abs((half * poses[:, :4]).sum(axis=1)) - 1.0).max() < 1e-9
+    still, _ = _poses(sol, float(frames.times[17]))
+    assert np.abs((half[17] * still["wheel"][:4]).sum()) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_poses_between_instants_are_good_to_the_fourth_order():
+    """Halved distances of instants leave a sixteenth of the error; straight lines leave a quarter."""
+    scene, t, names = shipped("chain"), np.linspace(0.0, 0.8, 57), ["rod3"]
+    near = ephs.simulate(scene, 0.8, save_at=t, rtol=1e-10).body("rod3")
+    misses = []
+    for count in (8, 15):
+        sol = ephs.simulate(scene, 0.8, save_at=np.linspace(0.0, 0.8, count), rtol=1e-10)
+        poses = poses_at(sol, names, t)["rod3"]
+        places = np.abs(poses[:, 4:] - near.position).max()
+        turns = np.linalg.norm(
+            np.minimum(np.abs(poses[:, :4] - near.quaternion), np.abs(poses[:, :4] + near.quaternion)), axis=1
+        ).max()
+        misses.append((places, turns))
+    (far, wide), (close, little) = misses
+    assert far > 8.0 * close > 0.0 and wide > 8.0 * little > 0.0
+
+
+def test_a_ball_that_bounces_is_never_drawn_in_the_floor():
+    """Velocities after an impact do not lead there."""
+    sol = ephs.simulate(scene_of_text(BOUNCING), 1.0)
+    drawn = film(sol, ["ball"], 500.0, None).poses["ball"][:, 6].min()
+    assert 0.1 - 1e-4 < drawn < 0.101 and np.abs(np.diff(sol.body("ball").velocity[:, 2])).max() > 1.0
 
 
 def test_duration_stretches_the_film(crank):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.mechanics.linear.modes import Mode
-from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.errors import OptionError, count_of, number_of
 
 if TYPE_CHECKING:
     from ephs.mechanics.linear.statespace import StateSpace
@@ -17,12 +17,15 @@ def film(
 ) -> "Solution":
     """See `StateSpace.film`."""
     modes = system.modes
-    if isinstance(mode, int):
-        if not -len(modes) <= mode < len(modes):
-            raise OptionError("mode", mode, f"a number below {len(modes)}")
+    if not isinstance(mode, Mode):
+        if not isinstance(mode, int) or not -len(modes) <= mode < len(modes):
+            raise OptionError("mode", mode, f"a mode, or a number below {len(modes)}")
         mode = modes[mode]
-    if frames < 2:
+    if (frames := count_of("frames", frames)) < 2:
         raise OptionError("frames", frames, "two or more")
+    for name, given in (("amplitude", amplitude), ("periods", periods)):
+        if not 0.0 < number_of(name, given, "a number > 0") < np.inf:
+            raise OptionError(name, given, "a number > 0")
     value = mode.eigenvalue
     unit = 2.0 * np.pi / abs(value.imag) if value.imag else 1.0 / abs(value.real) if value.real else 1.0
     t = np.linspace(0.0, periods * unit, frames)

@@ -61,10 +61,17 @@ def linearize(
     SimulationError
         No equilibrium was found, or the motion is not determined in the state.
     """
+    from ephs.mechanics.dynamics import State, dynamics
     from ephs.mechanics.linear.equilibrium import Equilibrium, equilibrium
 
     if form not in ("reduced", "paper"):
         raise OptionError("form", form, "reduced or paper")
+    for key, names in (("inputs", inputs), ("outputs", outputs)):
+        listed = isinstance(names, Sequence | Mapping) and not isinstance(names, str)
+        if names is not None and not (listed and all(isinstance(name, str) for name in names)):
+            raise OptionError(key, names, "names, as a list")
+    if not isinstance(state, State | Equilibrium | Mapping | str | None):
+        raise OptionError("state", state, "a state, values of states by path, an equilibrium, or the word equilibrium")
     if state == "equilibrium":
         state = equilibrium(model, inputs=inputs if isinstance(inputs, Mapping) else None, reference=reference)
     elif isinstance(state, str):
@@ -75,7 +82,6 @@ def linearize(
         raise OptionError("reference", reference, "none: a scene's [world] has its own")
     if isinstance(inputs, Mapping):
         raise OptionError("inputs", inputs, "names of joints, bodies and markers")
-    from ephs.mechanics.dynamics import State, dynamics
     from ephs.mechanics.linear.mechanism import linear_mechanism
 
     if isinstance(state, Equilibrium):
@@ -94,6 +100,8 @@ def linearize(
         }
         at = mechanism.state0 if state is None else mechanism.closed(state)
         return linear_mechanism(mechanism, at, inputs, outputs, points)
+    if inputs:
+        raise OptionError("inputs", inputs, "none in the paper's form of a scene; form reduced has them")
     at = mechanism.state0 if state is None else state
     assert isinstance(at, State)
     from ephs.mechanics.linear.system import linear_system

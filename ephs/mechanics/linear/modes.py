@@ -8,17 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.spaces.decompositions import eigen
+from ephs.semantics.spaces.decompositions import conditioned_eigen
 
 SHOWN = 1e-6
 """Least displayed component of a mode, relative to the largest."""
 
 Complex = NDArray[np.complex128]
 STILL = 1e-7
-"""Eigenvalues below this part of the largest count as zero, imaginary parts below this part of their eigenvalue too:
-a double one is good to the root of rounding only."""
+"""Root of rounding, to which double eigenvalues are good: imaginary parts below this part of their eigenvalue count as
+zero; so do eigenvalues below this part of the largest, where rounding of the matrix may change them by as much."""
 ROUNDING = 1e-12
-"""Real parts below this fraction of the largest eigenvalue count as zero."""
+"""Real parts below this fraction of the largest eigenvalue count as zero: rounding of the matrix, relative to its norm.
+"""
 
 
 @final
@@ -68,10 +69,11 @@ def modes_of(A: Array, shapes: Mapping[str, Array]) -> tuple[Mode, ...]:
     """Modes of ẋ = A x, slowest first; ``shapes`` are maps (d, states) from the states to named outputs."""
     if not A.size:
         return ()
-    found = eigen(A)
-    values, vectors = found[0].astype(np.complex128), found[1].astype(np.complex128)
-    top = float(np.abs(values).max(initial=0.0))
-    values[np.abs(values) < STILL * top] = 0.0
+    values, vectors, change = conditioned_eigen(A)
+    values, top = values.astype(np.complex128), float(np.abs(values).max(initial=0.0))
+    still = np.abs(values) < np.minimum(STILL * top, ROUNDING * change)
+    if abs(values[still].sum()) <= ROUNDING * top * values.size:  # of eigenvalues near each other the mean is known
+        values[still] = 0.0
     values.imag[np.abs(values.imag) < STILL * np.abs(values)] = 0.0
     values.real[np.abs(values.real) < ROUNDING * top] = 0.0
     kept = [i for i in range(values.size) if values[i].imag >= 0.0]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Number
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, final
 
@@ -10,6 +11,7 @@ import numpy as np
 from ephs.mechanics.linear.modes import Complex, Mode, modes_of
 from ephs.mechanics.linear.structure import MeasuredLaw, PortHamiltonian, Sizes, laws_of
 from ephs.semantics.bundles.bundle import Array
+from ephs.solve.posing.errors import OptionError
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -107,8 +109,20 @@ class StateSpace:
         )
 
     def transfer(self, s: complex) -> Complex:
-        """(p, m) the transfer matrix C (s − A)⁻¹ B + D at a complex frequency in 1/s."""
-        return np.asarray(self.C @ np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B) + self.D, dtype=complex)
+        """(p, m) the transfer matrix C (s − A)⁻¹ B + D at a complex frequency in 1/s.
+
+        Raises
+        ------
+        OptionError
+            It is an eigenvalue, or no finite number.
+        """
+        if not isinstance(s, Number) or isinstance(s, bool) or not np.isfinite(s):
+            raise OptionError("s", s, "one complex number in 1/s")
+        try:
+            through = np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B)
+        except np.linalg.LinAlgError:
+            raise OptionError("s", s, "a number beside the eigenvalues, at which the response is infinite") from None
+        return np.asarray(self.C @ through + self.D, dtype=complex)
 
     def film(
         self, mode: Mode | int, *, amplitude: float = 0.3, periods: float = 1.0, frames: int = 61, decay: bool = False
@@ -131,7 +145,7 @@ class StateSpace:
         Raises
         ------
         OptionError
-            There is no such mode.
+            There is no such mode, or an option is no number.
         """
         from ephs.mechanics.linear.film import film
 

@@ -54,7 +54,7 @@ def included(coupling: JointCoupling, coordinates: Array) -> Array:
         angular[:, 0 if spatial else 2 :] = coordinates[:, : 3 if spatial else 1]
         rest = coordinates[:, 3 if spatial else 1 :]
         linear[:, : rest.shape[1]] = rest
-        return np.concatenate([_turns(angular), linear], axis=1)
+        return np.concatenate([exponentials(angular), linear], axis=1)
     return _displaced(pair.basis, coordinates)
 
 
@@ -73,10 +73,10 @@ def _displaced(basis: Array, x: Array) -> Array:
     third = np.where(small, (1.0 - square * (0.05 - square / 840.0)) / 6.0, (safe - np.sin(safe)) / safe**3)
     across = _cross(angular.T, linear.T).T
     moved = linear + 0.5 * np.sinc(0.5 * angle / np.pi) ** 2 * across + third * _cross(angular.T, across.T).T
-    return np.concatenate([_turns(angular), moved], axis=1)
+    return np.concatenate([exponentials(angular), moved], axis=1)
 
 
-def _turns(angular: Array) -> Array:
+def exponentials(angular: Array) -> Array:
     """(n, 4) quaternions of rotation vectors (n, 3)."""
     half = 0.5 * np.sqrt(np.einsum("ni,ni->n", angular, angular))
     return np.concatenate([np.cos(half)[:, None], 0.5 * np.sinc(half / np.pi)[:, None] * angular], axis=1)

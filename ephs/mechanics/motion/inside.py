@@ -43,7 +43,7 @@ class Inside:
 
     def __init__(self, solution: "Solution", path: str | Path, scene: "Scene") -> None:
         self._solution, self._path, self.scene = solution, Path.of(path), scene
-        self.t, self.name = solution.t, f"{solution.name}.{path}"
+        self.t, self.name, self.stats = solution.t, f"{solution.name}.{path}", solution.stats
         self.problem = None  # the loads on the mechanism do not define a problem
         self._motion = SceneMotion(scene, cast(Any, self), lambda: BoxMotion(motion_of(solution), self._path))
         for name, _ in scene.all_bodies():

@@ -1,13 +1,13 @@
 """Inputs as signals: constants, functions of time, functions of time and state; users' times."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.bundles.errors import AssemblyError, listed
 from ephs.solve.posing.errors import OptionError, nearest_of
 from ephs.solve.posing.motion_law import MotionLaw
 from ephs.solve.posing.probe import ProbedInput
@@ -18,7 +18,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 View = Callable[[State], Mapping[Path, Array]]
-EXAMPLES = {"inputs": '{"joints.waist": 1.0}', "initial": '{"osc.pe.q": 1.0}'}
+EXAMPLES = {
+    "inputs": '{"joints.waist": 1.0}',
+    "bounds": '{"osc.pe.k": (1.0, 2.0)}',
+    **dict.fromkeys(("initial", "sigma"), '{"osc.pe.q": 1.0}'),
+    "start": '{"osc.pe.k": 1.0}',
+}
 """Options that are mappings, with an example for messages."""
 
 
@@ -47,11 +52,11 @@ def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View 
 
 
 def numbers_of(value: Any) -> Array | None:
-    """Input as an array of numbers, None where it is none; texts and truth values are none."""
+    """Input as an array of real numbers, NaN where masked, None where it is none; texts and truth values are none."""
     try:
-        given = np.asarray(value)
-        return None if given.dtype.kind in "SUb" else np.atleast_1d(given.astype(float))
-    except (TypeError, ValueError):
+        given = np.ma.asanyarray(value)
+        return np.atleast_1d(given.astype(float).filled(np.nan)) if given.dtype.kind in "iufO" else None
+    except (TypeError, ValueError, OverflowError):
         return None
 
 
@@ -109,6 +114,13 @@ def check_mappings(**options: object) -> None:
     for key, found in options.items():
         if not isinstance(found, Mapping | None):
             raise OptionError(key, found, f"names with values, as in {key}={EXAMPLES[key]}")
+
+
+def check_options(options: Mapping[str, object], known: Sequence[str]) -> None:
+    """Refuse options that there are not."""
+    for key in options:
+        if key not in known:
+            raise OptionError(key, options[key], f"no such option; there are {listed(key, known)}")
 
 
 def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[ProbedInput]:

@@ -39,16 +39,7 @@ def problem_of_system(
         raise no_model(system)
     if not isinstance(reference, Reference | None):
         raise OptionError("reference", reference, "ephs.Reference(temperature=…, pressure=…)")
-    descriptor = system.descriptor()
-    signals: dict[Path, Signal] = {}
-    for port, given in (inputs or {}).items():
-        if not isinstance(given, Mapping) or len(given) != 1 or not set(given) <= {"effort", "flow"}:
-            raise AssemblyError("input", port, found=given, expected="{'effort': f} or {'flow': f}")
-        ((side, value),) = given.items()
-        path = Path.of(port)
-        size = system.interface[path].quantity.space.dim if path in system.interface else None
-        signals[path] = signal(value, effort=side == "effort", name=str(path), size=size)
-    state = system.state(initial)
+    descriptor, signals, state = system.descriptor(), system_signals(system, inputs), system.state(initial)
     counters = {slot.path for slot in descriptor.components if slot.primitive.kind == "environment"}
     for slot in descriptor.states:
         given, of = state[slot.path], slot.quantity
@@ -66,6 +57,25 @@ def problem_of_system(
     if not any(map(is_posed, descriptor.numbering.quantities)):
         return made
     return _of_mechanism(made, {path: state[path] for path in map(Path.of, initial or {})}, assemble=assemble)
+
+
+def system_signals(system: System, inputs: Mapping[str, Any] | None) -> dict[Path, Signal]:
+    """Inputs at a system's outer ports as signals.
+
+    Raises
+    ------
+    AssemblyError
+        One says neither effort nor flow, or is no number.
+    """
+    signals: dict[Path, Signal] = {}
+    for port, given in (inputs or {}).items():
+        if not isinstance(given, Mapping) or len(given) != 1 or not set(given) <= {"effort", "flow"}:
+            raise AssemblyError("input", port, found=given, expected="{'effort': f} or {'flow': f}")
+        ((side, value),) = given.items()
+        path = Path.of(port)
+        size = system.interface[path].quantity.space.dim if path in system.interface else None
+        signals[path] = signal(value, effort=side == "effort", name=str(path), size=size)
+    return signals
 
 
 def is_posed(of: Quantity) -> bool:

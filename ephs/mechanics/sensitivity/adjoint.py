@@ -13,7 +13,7 @@ from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
 from ephs.mechanics.sensitivity.family import ParameterFamily, differentiated, relation_of
-from ephs.mechanics.sensitivity.sensitivity import ATOL, RTOL
+from ephs.mechanics.sensitivity.sensitivity import ATOL, RTOL, steps_of
 from ephs.mechanics.tree.engine.adjoints import StepAdjoint
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
@@ -21,7 +21,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.system import System
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.own import Method
-from ephs.solve.posing.errors import OptionError, failing_at
+from ephs.solve.posing.errors import OptionError, failing_at, number_of
 from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
@@ -90,6 +90,7 @@ def gradient(
     SimulationError
         The run failed.
     """
+    t0 = number_of("t0", t0)
     if not isinstance(method, Method) and method not in ("rk54", "rk87"):
         raise OptionError("method", method, "rk54, rk87 or an ephs.Method")
     family = ParameterFamily(model, parameters, initial, inputs, None, joints=True)
@@ -101,7 +102,7 @@ def gradient(
         raise OptionError("times", times, f"ascending times after {t0:g} s")
     if not isinstance(weights, Mapping) or not weights:
         raise OptionError("weights", weights, "a joint's reading and its weights at least")
-    control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
+    control = steps_of(step, rtol, atol)
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": method, "inputs": inputs}
     grid = np.union1d(simulate(model, float(wanted[-1]), **run, **control).t, wanted)
     with differentiated(parameters, t0):

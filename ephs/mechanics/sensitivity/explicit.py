@@ -324,9 +324,9 @@ class ExplicitTangent:
         """Change of the state by a unit of a parameter."""
         return float(max(np.abs(point.q[number]).max(initial=0.0), np.abs(point.y[number]).max(initial=0.0)))
 
-    def row(self, point: StatePoint) -> Row:
-        """Record of a state."""
-        return self.equations.row(point.state)
+    def rows(self, points: list[StatePoint]) -> list[Row]:
+        """Records of states."""
+        return [self.equations.row(point.state) for point in points]
 
     def beside(self, number: int, model: float, states: float, points: list[StatePoint]) -> tuple[Problem, list[Row]]:
         """The same of states along the tangents by an offset, and the problem of a neighbour by one."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.signals import check_mappings
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.model import Scene
@@ -74,6 +75,19 @@ def differentiated(parameters: Sequence[str], t: float) -> Iterator[None]:
                           "rods that expand have them at order 2, and ephs.sweep takes all") from error  # fmt: skip
 
 
+def check_paths(paths: Sequence[str]) -> None:
+    """Refuse what is no list of paths.
+
+    Raises
+    ------
+    OptionError
+        It says so.
+    """
+    several = isinstance(paths, Sequence) and not isinstance(paths, str) and all(isinstance(p, str) for p in paths)
+    if not several or not paths or len(set(paths)) < len(paths):
+        raise OptionError("parameters", paths, "one path or several, each once, as a list")
+
+
 def difference(function: Callable[[float], Array], stencil: Stencil, step: float) -> Array:
     """The derivative of a function at 0, by its values at multiples of a step."""
     return np.asarray(sum(weight * function(k * step) for k, weight in stencil) / step, dtype=float)
@@ -128,9 +142,8 @@ class ParameterFamily:
         *,
         joints: bool = False,
     ) -> None:
-        several = isinstance(paths, Sequence) and not isinstance(paths, str) and all(isinstance(p, str) for p in paths)
-        if not several or not paths or len(set(paths)) < len(paths):
-            raise OptionError("parameters", paths, "one path or several, each once, as a list")
+        check_paths(paths)
+        check_mappings(initial=initial, inputs=inputs)
         self.model, self._reference, self._joints = model, reference, joints
         self._initial, self._inputs = dict(initial or {}), dict(inputs or {})
         if isinstance(model, Scene):

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.runs.signals import numbers_of
+from ephs.mechanics.runs.signals import check_mappings, check_options, numbers_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
+from ephs.mechanics.sensitivity.family import check_paths
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
 from ephs.semantics.bundles.bundle import Array
@@ -30,6 +31,8 @@ FIRST = 1e-6
 """Part of the residual by which a number that starts at zero changes it at once: SciPy's first steps are as large."""
 UNSEEN = 1e-12
 """Change of readings, relative to the record, that is rounding if a number changes by its own size."""
+OPTIONS = ("method", "step", "rtol", "atol", "t0", "initial", "inputs", "reference")
+"""Options of `sensitivity` that a fit takes."""
 POSITIVE = ("mass", "friction", "stiffness", "damping", "length", "capacity", "temperature", "conductance")
 """Numbers of a scene that are not negative unless bounds say so; so are the diagonal of an inertia, and what the
 components of a system take."""
@@ -122,8 +125,9 @@ def fit(
     """
     from scipy.optimize import least_squares
 
-    if isinstance(parameters, str) or not isinstance(parameters, Sequence) or not parameters:
-        raise OptionError("parameters", parameters, "one path or several, as a list")
+    check_options(run, OPTIONS)
+    check_mappings(start=start, bounds=bounds, sigma=sigma, initial=run.get("initial"), inputs=run.get("inputs"))
+    check_paths(parameters)
     for name, given in (("start", start), ("bounds", bounds)):
         _check_names(name, given or {}, parameters)
     limits = {path: numbers_of(pair) for path, pair in (bounds or {}).items()}
@@ -134,7 +138,7 @@ def fit(
         raise no_model(model)
     if isinstance(model, System):
         model = model.with_initial(run.pop("initial", None) or {})
-    record = _RecordedVector(model, data, sigma or {})
+    record = _RecordedVector(model, data, sigma or {}, number_of("t0", run.get("t0", 0.0)))
     evaluations = count_of("max_evaluations", max_evaluations)
     lower, upper = np.array([limits.get(path, _bounds(model, path)) for path in parameters], dtype=float).T
     guess = np.clip([read(model, path) for path in parameters], lower, upper)
@@ -183,17 +187,21 @@ def fit(
 class _RecordedVector:
     """Recorded values as one vector."""
 
-    def __init__(self, model: System | Scene, data: Mapping[str, "ArrayLike"], sigma: Mapping[str, float]) -> None:
+    def __init__(
+        self, model: System | Scene, data: Mapping[str, "ArrayLike"], sigma: Mapping[str, float], t0: float
+    ) -> None:
         if not isinstance(data, Mapping) or "t" not in data or len(data) < 2:
-            raise OptionError("data", sorted(data) if data else data, "the times t, and a reading at least")
+            found = sorted(map(str, data)) if isinstance(data, Mapping) else type(data).__name__
+            raise OptionError("data", found, "the times t, and a reading at least, by name")
         found = {name: numbers_of(values) for name, values in data.items()}
         for name, values in found.items():
-            if values is None:
-                raise OptionError(f"data[{name!r}]", data[name], "numbers")
+            if values is None or np.any(np.isinf(values)):
+                raise OptionError(f"data[{name!r}]", data[name], "finite numbers, or NaN for missing ones")
         self.values: dict[str, Array] = {name: np.asarray(values) for name, values in found.items()}
         self.t = self.values.pop("t")
-        if not (self.t.ndim == 1 and np.all(np.isfinite(self.t)) and np.all(np.diff(self.t) > 0.0)):
-            raise OptionError("data['t']", self.t.tolist(), "ascending times in s")
+        ascending = self.t.ndim == 1 and self.t.size and np.all(np.diff(self.t) > 0.0)
+        if not (ascending and t0 <= self.t[0] and t0 < self.t[-1] < np.inf):
+            raise OptionError("data['t']", self.t.tolist(), f"ascending times in s, from t0 = {t0:g} s on")
         for name, values in self.values.items():
             if values.shape[:1] != self.t.shape:
                 raise OptionError(f"data[{name!r}]", values.shape, f"({self.t.size}, …): one row a time")

@@ -46,14 +46,16 @@ class MethodPoint:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Side:
-    """A problem, and its model."""
+    """A problem, its model, and the energies of that."""
 
     problem: Problem
     model: Model
+    stored: StoredEnergies
 
     @staticmethod
     def of(problem: Problem, t0: float) -> "_Side":
-        return _Side(problem, model_of(problem, t0))
+        model = model_of(problem, t0)
+        return _Side(problem, model, StoredEnergies(model))
 
     def numbers(self, name: str) -> Array:
         """Point at which the equations are evaluated."""
@@ -216,18 +218,17 @@ class NaturalTangent:
         """Change of the state by a unit of a parameter."""
         return float(np.abs(point.x[number]).max(initial=0.0))
 
-    def row(self, point: MethodPoint) -> Row:
-        """Record of a state."""
-        return self._row(self.side.model, point.state.x, point.state.sums)
+    def rows(self, points: list[MethodPoint]) -> list[Row]:
+        """Records of states."""
+        return self._rows(self.side, [(p.state.x, p.state.sums) for p in points])
 
     def beside(self, number: int, model: float, states: float, points: list[MethodPoint]) -> tuple[Problem, list[Row]]:
         """The same of states along the tangents by an offset, and the problem of a neighbour by one."""
         side = self._other(number, model)
-        rows = [
-            self._row(side.model, self._moved(p.state.x + states * p.x[number]), p.state.sums + states * p.sums[number])
-            for p in points
+        states_and_sums = [
+            (self._moved(p.state.x + states * p.x[number]), p.state.sums + states * p.sums[number]) for p in points
         ]
-        return side.problem, rows
+        return side.problem, self._rows(side, states_and_sums)
 
     def _moved(self, x: Array) -> Array:
         """States, their quaternions of length one."""
@@ -235,5 +236,5 @@ class NaturalTangent:
             x[slot.point] = group.normalise(x[slot.point])
         return x
 
-    def _row(self, model: Model, x: Array, sums: Array) -> Row:
-        return Row(x, np.where(self._makers, sums[4:], StoredEnergies(model).energies(x)), sums[:4])
+    def _rows(self, side: _Side, of: list[tuple[Array, Array]]) -> list[Row]:
+        return [Row(x, np.where(self._makers, sums[4:], side.stored.energies(x)), sums[:4]) for x, sums in of]

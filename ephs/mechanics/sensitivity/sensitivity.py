@@ -3,11 +3,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from threading import Lock
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.runs.signals import numbers_of
+from ephs.mechanics.runs.signals import times_of
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.family import CENTRAL, Parameter, ParameterFamily, difference, differentiated
@@ -15,9 +16,10 @@ from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.systems.system import System
 from ephs.solve.methods.own import Method
-from ephs.solve.posing.errors import OptionError, failing_at, nearest_of
+from ephs.solve.posing.errors import OptionError, failing_at, nearest_of, number_of
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
+from ephs.solve.running.control import Tolerance
 from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
@@ -157,21 +159,20 @@ def sensitivity(
     name = _method(method, step)
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": name, "inputs": inputs, "reference": reference}
     family = ParameterFamily(model, parameters, initial, inputs, reference, joints=name != "natural")
-    control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
-    times = None if save_at is None else numbers_of(save_at)
-    if save_at is not None and times is None:
-        raise OptionError("save_at", save_at, "ascending times in s")
+    control = steps_of(step, rtol, atol)
+    times = times_of(save_at, number_of("t0", t0), number_of("until", until))
+    if times is not None and not times.size:
+        raise OptionError("save_at", save_at, "at least one time in s")
     grid = simulate(model, until, **run, **control).t
-    if times is not None and not (
-        times.ndim == 1
-        and times.size
-        and np.all(np.diff(times) > 0.0)
-        and grid[0] <= times[0]
-        and times[-1] <= grid[-1]
-    ):
-        raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
     with differentiated(parameters, float(grid[0])):
         return _along(family, name, grid, times, chosen=step is None)
+
+
+def steps_of(step: float | None, rtol: float, atol: float) -> dict[str, Any]:
+    """Options of the run whose steps are kept; tolerances have no part in constant ones, but are checked."""
+    for name, given in (("rtol", rtol), ("atol", atol)):
+        Tolerance.of(name, given, 0.0)
+    return {"rtol": rtol, "atol": atol} if step is None else {"step": step}
 
 
 def _method(method: str | Method, step: float | None) -> str | Method:
@@ -208,15 +209,17 @@ def _along(
     kept: list[Any] = [point] if wanted[0] == t0 else []
     for before, after in zip(grid[:-1].tolist(), grid[1:].tolist(), strict=True):
         with failing_at(before):
-            for when in wanted[(wanted > before) & (wanted < after)].tolist():
+            for when in wanted[(wanted - before) * (wanted - after) < 0.0].tolist():
                 kept.append(stepper.step(point, when - before))
             point = stepper.step(point, after - before)
         if after in wanted:
             kept.append(point)
-    solution = replay(family.problem, wanted, [stepper.row(p) for p in kept], name)
+    alone = Lock()  # neighbours are evaluated in memory of their own problem
+    solution = replay(family.problem, wanted, stepper.rows(kept), name)
 
     def neighbour(number: int, model: float, states: float) -> Solution:
-        problem, rows = stepper.beside(number, model, states, kept)
+        with alone:
+            problem, rows = stepper.beside(number, model, states, kept)
         return replay(problem, wanted, rows, name)
 
     sizes = [max((stepper.size(p, j) for p in kept), default=0.0) for j in range(len(family.parameters))]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from ephs.mechanics.runs.signals import numbers_of
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.posing.errors import OptionError
 
@@ -49,11 +50,8 @@ class Axes:
             raise OptionError("vary", vary, "a path and its values, such as {'bodies.crank.mass': [0.1, 0.2]}")
         values: list[Array] = []
         for path, given in vary.items():
-            try:
-                found = np.atleast_1d(np.asarray(given, dtype=float))
-            except (TypeError, ValueError):
-                found = np.zeros(0)
-            if found.ndim != 1 or not found.size or not np.all(np.isfinite(found)):
+            found = numbers_of(given)
+            if found is None or found.ndim != 1 or not found.size or not np.all(np.isfinite(found)):
                 raise OptionError(f"vary[{path!r}]", given, "one finite number or a list of them")
             values.append(found)
         sizes = {found.size for found in values}

@@ -89,7 +89,7 @@ def outputs_of(model: "Scene | System", names: Sequence[str] | None) -> tuple[Ou
             names += ["heat", "work"]
         else:
             names = [name for name in known if name not in TOTALS]
-    if isinstance(names, str):
+    if isinstance(names, str) or not isinstance(names, Sequence):
         raise OptionError("outputs", names, "names of outputs, as a list")
     for name in names:
         if name not in known:

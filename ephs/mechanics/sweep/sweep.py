@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.runs.signals import times_of
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.signals import check_mappings, check_options, times_of
+from ephs.mechanics.runs.system_problem import system_signals
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sweep.axes import MEMBER, Axes
 from ephs.mechanics.sweep.job import DONE, Job, MemberBatch
 from ephs.mechanics.sweep.outputs import outputs_of
-from ephs.semantics.bundles.errors import listed
+from ephs.semantics.descriptor.descriptor import Input
 from ephs.solve.equations.sparse import Index
-from ephs.solve.posing.errors import OptionError, count_of, number_of
+from ephs.solve.posing.errors import OptionError, count_of, failing_at, number_of
+from ephs.solve.posing.sampled import holding
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -114,9 +117,11 @@ def sweep(
         The sweep was stopped; ``.partial`` is the table of the members that were run.
     """
     axes = Axes.of(vary, paired=paired)
-    unknown = [key for key in options if key not in _OPTIONS]
-    if unknown:
-        raise OptionError(unknown[0], options[unknown[0]], f"no such option; there are {listed(unknown[0], _OPTIONS)}")
+    check_options(options, _OPTIONS)
+    if client is not None and not callable(getattr(client, "submit", None)):
+        raise OptionError("client", client, "a dask.distributed.Client")
+    if progress is not None and not callable(progress):
+        raise OptionError("progress", progress, "a function of (done, members, failed)")
     for path in axes.paths:
         read(model, path)
     threads = (os.cpu_count() or 1) if workers is None else count_of("workers", workers)
@@ -128,6 +133,7 @@ def sweep(
     times = times_of(save_at, start, end)
     if times is None or not times.size:
         raise OptionError("save_at", save_at, "at least one time in s")
+    _check_inputs(model, options.get("inputs"), start, end)
     kept = outputs_of(model, outputs)
     job = Job(Job.document(model), axes, start, end, times, dict(options), kept, uuid.uuid4().hex, _own(model))
     count = len(axes.members)
@@ -145,6 +151,32 @@ def sweep(
     finally:
         run.close()
     return _table(job, batches, model, time.perf_counter() - begin)
+
+
+def _check_inputs(model: "System | Scene", inputs: Any, t0: float, until: float) -> None:
+    """Refuse inputs that no member has, before the first one is run.
+
+    Raises
+    ------
+    AssemblyError, OptionError
+        An input has no port, a port no input, or one is no number.
+    SimulationError
+        A function of time has no value at the start.
+    """
+    check_mappings(inputs=inputs)
+    given, _ = holding(inputs or {}, t0, until)
+    if isinstance(model, Scene):
+        problem = problem_of_scene(model, None, given)
+        descriptor, signals = problem.descriptor, problem.signals
+    else:
+        descriptor, signals = model.descriptor(), system_signals(model, given)
+    sizes = {slot.path: slot.quantity.space.dim for slot in descriptor.outer}
+    with failing_at(t0):
+        values = {
+            path: Input(one.at(t0, {}) if one.constant or one.timed else np.zeros(sizes.get(path, 0)), one.effort)
+            for path, one in signals.items()
+        }
+    descriptor.complete_inputs(values)
 
 
 def _parts(count: int, workers: int) -> list[Index]:

@@ -147,12 +147,16 @@ class Descriptor:
     @property
     def outer(self) -> tuple[JunctionSlot, ...]:
         """The exposed power junctions."""
-        n, efforts = self.numbering, self._efforts
-        ports = [path for path, port in self.system.interface.items() if port.power]
-        return tuple(
-            JunctionSlot(path, n.quantities[n.junctions[i]], int(efforts[i]), True)
-            for path, i in zip(ports, n.outer.tolist(), strict=True)
-        )
+
+        def slots() -> tuple[JunctionSlot, ...]:
+            n, efforts = self.numbering, self._efforts
+            ports = [path for path, port in self.system.interface.items() if port.power]
+            return tuple(
+                JunctionSlot(path, n.quantities[n.junctions[i]], int(efforts[i]), True)
+                for path, i in zip(ports, n.outer.tolist(), strict=True)
+            )
+
+        return once(self, "outer", slots)
 
     @property
     def strikes(self) -> Path | None:

@@ -109,6 +109,24 @@ def eigen(matrix: Any) -> tuple[Any, Any]:
     return _robust("eigenvalues", matrix, np.linalg.eig)
 
 
+def conditioned_eigen(matrix: Any) -> tuple[Any, Any, Any]:
+    """Eigenvalues (n,) and eigenvectors (n, n) of a square matrix, and by how much a change of the balanced matrix by
+    its own norm would change each eigenvalue (n,), to first order: infinite where it is defective; errors as of `svd`.
+    """
+
+    def balanced(a: Any) -> tuple[Any, ...]:
+        la = _scipy()
+        if not np.isfinite(a).all():
+            raise np.linalg.LinAlgError
+        even, _, _, scale, _ = la.lapack.dgebal(a, permute=0, scale=1)
+        values, left, right = la.eig(even, left=True)
+        with np.errstate(divide="ignore"):
+            change = np.linalg.norm(even) / np.abs(np.sum(left.conj() * right, axis=0))
+        return values, scale[:, None] * right, change
+
+    return _robust("eigenvalues", matrix, balanced)
+
+
 def eigenvalues(matrix: Any) -> Any:
     """(…, n) eigenvalues of any square matrices; errors as of `svd`."""
     (found,) = _robust("eigenvalues", matrix, lambda a: (np.linalg.eigvals(a),))

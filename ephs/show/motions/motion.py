@@ -7,13 +7,16 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.motion.batch import compose, exponentials, inverse
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd, symmetric_eigen
 from ephs.semantics.spaces.rank import DIRECTION, TINY
-from ephs.semantics.spaces.rotations import matrix_to_quaternion
+from ephs.semantics.spaces.rotations import matrix_to_quaternion, rotation_log
 
 OPPOSITE = 1e-9
 """Distance of a cosine from −1 within which a rotation's axis is arbitrary."""
+MISSED = 0.25
+"""Part of the velocities by which their mean may miss the way between two instants, for these to bend it."""
 PLANAR = 1e-12
 """Relative squared distance of collinear points from a line."""
 
@@ -67,8 +70,7 @@ def film(sol: Any, names: list[str], fps: float, duration: float | None, most: i
     playing = span if duration is None else float(duration)
     count = max(2, min(most, round(playing * fps) + 1))
     times = np.linspace(t[0], t[-1], count) if span > 0 else t[:1]
-    poses = {name: _sampled(t, sol.body(name), times) for name in names}
-    return Film(times, float(playing / max(1, count - 1)), poses)
+    return Film(times, float(playing / max(1, count - 1)), poses_at(sol, names, times))
 
 
 def between_instants(t: Array, times: Array, values: Array) -> Array:
@@ -84,16 +86,45 @@ def nearest(t: Array, times: Array) -> NDArray[np.int64]:
     return order[np.where(times - t[order[before]] <= t[order[after]] - times, before, after)]
 
 
-def _sampled(t: Array, body: Any, times: Array) -> Array:
-    turns = np.asarray(body.quaternion, dtype=float).copy()
-    # q and -q are one rotation: continuous signs, so that blending takes the shorter arc.
-    flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0, -1.0, 1.0)
-    turns[1:] *= np.cumprod(flips)[:, None]
-    places = np.asarray(body.position, dtype=float)
-    columns = [between_instants(t, times, column) for column in (*turns.T, *places.T)]
-    poses = np.stack(columns, axis=1)
-    poses[:, :4] /= np.linalg.norm(poses[:, :4], axis=1, keepdims=True)
-    return poses
+def poses_at(sol: Any, names: list[str], times: Array) -> dict[str, Array]:
+    """Poses (n, 7) of bodies at times: between instants cubic in time, by the poses and velocities there.
+
+    Where velocities do not lead from one instant to the next, as at impacts and in modes, they are straight lines.
+    """
+    t, moving = np.asarray(sol.t, dtype=float), sol.stats.get("method") != "mode"
+    return {name: _sampled(t, sol.body(name), times, float(moving)) for name in names}
+
+
+def _sampled(t: Array, body: Any, times: Array, moving: float) -> Array:
+    poses = np.hstack([body.quaternion, body.position])
+    if len(t) < 2:
+        return np.repeat(poses, len(times), axis=0)
+    forward = 1.0 if t[-1] > t[0] else -1.0
+    k = np.clip(np.searchsorted(forward * t, forward * times, side="right") - 1, 0, len(t) - 2)
+    h = (t[k + 1] - t[k])[:, None]
+    share, before, after = (times - t[k])[:, None] / h, poses[k], poses[k + 1]
+    turn = rotation_log(compose(inverse(before), after)[:, :4])
+    (v, v_end), (w, w_end) = ([moving * h * x[i] for i in (k, k + 1)] for x in (body.velocity, body.angular_velocity))
+    mean, size = 0.5 * (w + w_end), np.linalg.norm(turn, axis=1, keepdims=True)
+    axis = np.where(size > DIRECTION, turn, mean)
+    axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), TINY)
+    whole = np.round(np.sum((mean - turn) * axis, axis=1, keepdims=True) / (2.0 * math.pi))
+    half = 0.5 * np.maximum(size, DIRECTION)  # of the angle; the twist's last end as a rate of the rotation vector
+    bent = np.cross(turn, np.cross(turn, w_end)) * (1.0 - half / np.tan(half)) / (2.0 * half) ** 2
+    ends = np.where(whole == 0.0, w_end + 0.5 * np.cross(turn, w_end) + bent, w_end)
+    turned = exponentials(_cubic(turn + 2.0 * math.pi * whole * axis, w, ends, share))
+    out = compose(before, np.hstack([turned, np.zeros_like(mean)]))
+    out[:, 4:] = before[:, 4:] + _cubic(after[:, 4:] - before[:, 4:], v, v_end, share)
+    return out
+
+
+def _cubic(way: Array, first: Array, last: Array, share: Array) -> Array:
+    """(n, d) parts of ways: cubic ones with slopes at both ends, straight ones where their mean is another way."""
+    miss, size = (
+        np.linalg.norm(x, axis=1, keepdims=True) for x in (way - 0.5 * (first + last), np.hstack([first, last]))
+    )
+    bow = share * (1.0 - share) * ((1.0 - share) * (first - way) - share * (last - way))
+    return share * way + np.where(miss <= MISSED * size, bow, 0.0)
 
 
 def rotate(quaternion: Array, vector: Array) -> Array:

@@ -17,7 +17,9 @@ class StoredEnergies:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self._storages: Evaluation | None = None
+        self._storages, t = Evaluation(model.only(np.flatnonzero(model.tables.kind == STORING))), model.tables
+        own = self._storages.model.tables
+        self._efforts, self._rates = t.counts[0] + efforts_of(own, slice(None)), rates_of(own, slice(None))
         self._whole: Evaluation | None = None
 
     def efforts(self, x: Array) -> Array:
@@ -25,11 +27,9 @@ class StoredEnergies:
         model = self.model
         d, n_rate = model.descriptor, int(model.tables.counts[0])
         z = np.zeros(model.unknowns)
-        found = self._storages = self._storages or Evaluation(model.only(np.flatnonzero(model.tables.kind == STORING)))
-        status, _ = found.at(x, z, 0.0)
+        status, _ = self._storages.at(x, z, 0.0)
         if not status:
-            t = found.model.tables
-            z[n_rate + efforts_of(t, slice(None))] = -found.memory.residual[rates_of(t, slice(None))]
+            z[self._efforts] = -self._storages.memory.residual[self._rates]
             return z
         for slot, storage in d.storages:  # one after the other, as one of them has no effort there
             with suppress(Exception):

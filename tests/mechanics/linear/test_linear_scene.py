@@ -326,11 +326,22 @@ def test_a_ball_sinks_into_a_floor_and_swings_on_it_as_the_law_of_contact_says(h
     ("keys", "what"),
     [({"inputs": ["joints.man"]}, "joints.main"), ({"outputs": ["bodies.crank.place"]}, "did you mean"),
      ({"inputs": ["joints.main.coordinate"]}, "a joint"), ({"form": "tree"}, "reduced"),
-     ({"state": "rest"}, "equilibrium")],
+     ({"state": "rest"}, "equilibrium"), ({"state": 3}, "state is 3"), ({"inputs": "joints.main"}, "as a list"),
+     ({"outputs": [3]}, "as a list"), ({"form": "paper", "inputs": ["joints.main"]}, "none in the paper's form")],
 )  # fmt: skip
 def test_what_cannot_be_is_named(keys, what):
     with pytest.raises(ephs.OptionError, match=what):
         ephs.linearize(shipped("four-bar"), **keys)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{"mode": 99}, {"mode": "slow"}, {"mode": 0, "amplitude": np.nan}, {"mode": 0, "periods": -1.0},
+     {"mode": 0, "periods": 0}, {"mode": 0, "frames": 2.5}, {"mode": 0, "frames": 1}],
+)  # fmt: skip
+def test_films_that_cannot_be_are_refused(keys):
+    with pytest.raises(ephs.OptionError, match=f"{list(keys)[-1]} is"):
+        ephs.linearize(shipped("chain")).film(**keys)
 
 
 def test_what_turns_for_ever_has_no_equilibrium():

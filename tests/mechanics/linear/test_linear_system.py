@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from scipy.linalg import block_diag
 
 import ephs
 from ephs import Pattern
@@ -168,6 +169,36 @@ def test_a_spring_settles_under_its_load():
 def test_what_cannot_be_is_named(keys, what):
     with pytest.raises(ephs.OptionError, match=what):
         ephs.linearize(MASS, **keys)
+
+
+@pytest.mark.parametrize("s", [2.0j, "2", np.nan, [1.0j], None])
+def test_where_there_is_no_response_is_said(s):
+    found = ephs.linearize(oscillator(k=4.0, m=1.0), inputs={"p": {"flow": 0.0}})
+    assert found.transfer(1.0j)[0, 0] == pytest.approx(1.0j / 3.0, rel=1e-12)
+    with pytest.raises(ephs.OptionError, match="s is"):
+        found.transfer(s)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_slow_modes_beside_fast_ones_are_those_of_their_own(seed):
+    """λ² + 2 ζ ω λ + ω² = 0 of each oscillator, ω by up to ten decades apart; a free one has two zeros."""
+    rng = np.random.default_rng(seed)
+    slow, damping = 10.0 ** rng.uniform(-5.0, 2.0), [0.0, 0.05, 0.7, 3.0, 1.0][seed]
+    free = np.array([[0.0, 1.0], [0.0, 0.0]])
+
+    def oscillator(omega, damping):
+        return np.array([[0.0, 1.0], [-(omega**2), -2.0 * damping * omega]])
+
+    A = block_diag(oscillator(1e5, 0.01), oscillator(slow, damping), free)
+    turned = np.linalg.qr(rng.standard_normal((2, 2)))[0]
+    A[4:, 4:] = 3e3 * turned @ free @ turned.T
+    found = modes_of(A, {})
+    assert [mode.eigenvalue for mode in found[:2]] == [0.0, 0.0]
+    root = slow * np.sqrt(complex(damping**2 - 1.0))
+    wanted = [-damping * slow + root] if damping < 1.0 else [-damping * slow + root, -damping * slow - root]
+    rounding = 1e-11 * slow if damping != 1.0 else 1e-7 * slow  # a double one, to the root
+    assert len(found) == 3 + len(wanted)
+    assert largest(np.array([mode.eigenvalue for mode in found[2:-1]]) - wanted) <= rounding
 
 
 def test_double_real_eigenvalues_are_not_oscillations():

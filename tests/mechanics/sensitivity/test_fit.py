@@ -7,6 +7,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.parameters import read, varied
+from ephs.solve.equations.model import Evaluation
 from tests.numerics import largest
 from tests.oscillator import damped_oscillator
 from tests.scenes import shipped
@@ -121,6 +122,28 @@ def test_a_search_may_begin_at_zero():
     assert [read(found.model, path) for path in found.values] == list(found.values.values())
 
 
+def test_masked_entries_of_a_record_are_missing():
+    truth = ephs.simulate(damped_oscillator(), 1.0, step=0.05, initial={"osc.pe.q": 1.0})
+    hidden = np.arange(truth.t.size) % 3 == 1
+    values = np.where(hidden, 7.0, truth["osc.pe.q"])
+    run = {"parameters": ["mf.d"], "start": {"mf.d": 0.3}, "step": 0.05, "initial": {"osc.pe.q": 1.0}}
+    found = ephs.fit(damped_oscillator(), {"t": truth.t, "osc.pe.q": np.ma.masked_array(values, hidden)}, **run)
+    assert found.values["mf.d"] == pytest.approx(0.1, rel=1e-9)
+
+
+def test_a_longer_record_builds_no_more_equations(monkeypatch):
+    built, of = [], Evaluation.__init__
+    monkeypatch.setattr(Evaluation, "__init__", lambda self, model: (built.append(model), of(self, model))[1])
+
+    def count(instants):
+        built.clear()
+        motion = ephs.sensitivity(damped_oscillator(), ["mf.d"], 1.0, step=1.0 / instants, initial={"osc.pe.q": 1.0})
+        motion["osc.pe.q"]
+        return len(built)
+
+    assert count(5) == count(40) > 0
+
+
 def test_a_number_alone_that_no_reading_shows_has_no_error_bound():
     """A rest without a stiffness: what its derivative has is rounding."""
     scene = double_pendulum()
@@ -133,7 +156,11 @@ def test_a_number_alone_that_no_reading_shows_has_no_error_bound():
     [({"osc.pe.q": [0.0]}, "times t"), ({"t": [0.0, 1.0], "osc.pe.q": [0.0]}, "one row a time"),
      ({"t": [0.0, 1.0], "osc.pe.q": [0.0, np.nan]}, "2 or more"),
      ({"t": [1.0, 0.0], "osc.pe.q": [0.0, 1.0]}, "ascending times"),
-     ({"t": [0.0, 1.0], "osc.pe.q": ["0", "1"]}, "expected numbers"), (None, "times t")],
+     ({"t": [0.0, 1.0], "osc.pe.q": ["0", "1"]}, "expected finite numbers"), (None, "times t"),
+     ({"t": [0.0, 1.0], "osc.pe.q": [0.0, 1.0j]}, "expected finite numbers"), ([0.0], "'list'.*times t"),
+     ({"t": [0.0, 1.0], "osc.pe.q": [0.0, np.inf]}, "expected finite numbers"),
+     ({"t": [-0.5, 1.0], "osc.pe.q": [0.0, 1.0]}, r"data\['t'\].*from t0 = 0 s on"),
+     ({"t": [0.0], "osc.pe.q": [0.0]}, r"data\['t'\].*from t0 = 0 s on")],
 )  # fmt: skip
 def test_records_that_do_not_fit_are_refused(data, what):
     with pytest.raises(ephs.OptionError, match=what):
@@ -150,7 +177,11 @@ def test_records_that_do_not_fit_are_refused(data, what):
      ({"start": {"osc.pe.k": "stiff"}}, "start.*within"), ({"max_evaluations": 0}, "a whole number > 0"),
      ({"sigma": {"osc.pe.q": "1"}}, "a number > 0"),
      ({"sigma": {"osc.pe.k": 1.0}}, "sigma.*one of osc.pe.q"),
-     ({"sigma": {"osc.pe.q": 0.0}}, "a number > 0"), ({"sigma": {"osc.pe.q": np.nan}}, "a number > 0")],
+     ({"sigma": {"osc.pe.q": 0.0}}, "a number > 0"), ({"sigma": {"osc.pe.q": np.nan}}, "a number > 0"),
+     *(({key: value}, f"{key} is .*names with values") for key in ("start", "bounds", "sigma", "initial", "inputs")
+       for value in ("x", [1.0], 2.0)),
+     ({"metod": "rk87"}, "metod .*no such option.*did you mean 'method'"), ({"save_at": [0.5]}, "no such option"),
+     ({"rtol": "fine"}, "rtol is 'fine'"), ({"t0": "now"}, "t0 is 'now'"), ({"t0": 2.0}, "from t0 = 2 s on")],
 )  # fmt: skip
 def test_options_that_would_change_nothing_or_have_no_meaning_are_refused(options, what):
     data = {"t": [0.0, 0.5, 1.0], "osc.pe.q": [0.1, 0.0, -0.1]}

@@ -245,7 +245,9 @@ def test_what_steps_made_is_not_known_of_a_motion_along_a_tangent():
         ({"parameters": []}, "one path or several"),
         ({"parameters": "bodies.crank.mass"}, "one path or several"),
         ({"save_at": [0.2, 0.1]}, "ascending"),
-        ({"save_at": []}, "ascending"),
+        ({"save_at": []}, "at least one time"),
+        ({"save_at": [0.05], "until": -0.1}, r"times in \[-0.1, 0.0\]"),
+        ({"save_at": [-0.1, -0.05], "until": -0.1}, "descending"),
         ({"model": scene_of_text(HARD), "method": "rk54"}, "impulses"),
     ],
 )
@@ -253,6 +255,37 @@ def test_what_cannot_be_is_named(keys, what):
     given = {"model": shipped("four-bar"), "parameters": ["bodies.crank.mass"], "until": 0.1} | keys
     with pytest.raises(ephs.OptionError, match=what):
         ephs.sensitivity(**given)
+
+
+SLIDER = """
+format = 1
+name = "slider"
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.a]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "a"]
+frame1 = {}
+frame2 = {}
+stiffness = 8.0
+coordinate = 0.3
+rate = -0.2
+"""
+
+
+@pytest.mark.parametrize("until", [1.5, -1.5])
+def test_derivatives_at_times_between_steps_are_those_of_the_closed_form_either_way(until):
+    """q = q₀ cos ω τ + (v₀/ω) sin ω τ with ω = 2, by q₀ and v₀, at times after a start that is not zero."""
+    t0, parts = 4.0, np.array([0.0, 0.13, 0.5, 0.77, 1.0])
+    paths, times = ["joints.rail.coordinate", "joints.rail.rate"], t0 + until * parts
+    found = ephs.sensitivity(scene_of_text(SLIDER), paths, t0 + until, t0=t0, save_at=times, rtol=1e-12, atol=1e-13)
+    assert found.t.tolist() == times.tolist()
+    turn = 2.0 * (times - t0)
+    wanted = np.stack([np.cos(turn), np.sin(turn) / 2.0], axis=-1)
+    assert largest(found["joints.rail.coordinate"][:, 0] - wanted) < 1e-9
 
 
 def test_unknown_readings_name_the_nearest():

@@ -17,9 +17,10 @@ from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
 from ephs.mechanics.sweep.outputs import known_outputs, outputs_of
+from ephs.semantics.bundles.errors import AssemblyError
 from ephs.testing import mechanisms
 from tests.numerics import largest
-from tests.oscillator import free_oscillator
+from tests.oscillator import free_oscillator, oscillator
 from tests.scenes import ROOT
 from tests.written import scene_of_text
 
@@ -316,12 +317,43 @@ def test_what_a_cluster_forgets_is_asked_for_again(monkeypatch):
         ({"bodies.rod1.mass": [1.0]}, {"outputs": "heat"}, "as a list"),
         ({"bodies.rod1.mass": [1.0]}, {"outputs": [None]}, "the name of an output"),
         ({1: [1.0]}, {}, "a path and its values"),
+        ({"bodies.rod1.mass": [True, False]}, {}, "one finite number or a list of them"),
+        ({"bodies.rod1.mass": ["1", "2"]}, {}, "one finite number or a list of them"),
+        ({"bodies.rod1.mass": [1.0]}, {"outputs": 3}, "as a list"),
+        ({"bodies.rod1.mass": [1.0]}, {"client": "here"}, "client is 'here'"),
+        ({"bodies.rod1.mass": [1.0]}, {"progress": "loud"}, "progress is 'loud'"),
+        ({"bodies.rod1.mass": [1.0]}, {"inputs": "strong"}, "inputs is 'strong'"),
         *(({"bodies.rod1.mass": [1.0]}, {"workers": n}, "workers.*a whole number > 0") for n in (0, -1, 1.5, "2")),
     ],
 )
 def test_wrong_questions_are_refused(vary, more, says):
     with pytest.raises(ephs.OptionError, match=says):
         ephs.sweep(ephs.load(CHAIN), vary, 0.1, **more)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "says"),
+    [
+        ({"joints.j9": 1.0}, "joints.j9: no such outer power port.*did you mean"),
+        ({"joints.j0": "hard"}, "joints.j0: the input is 'hard'"),
+        ({"joints.j0": [1.0, 2.0]}, "joints.j0: the input is .*1 finite number"),
+        ({"joints.j0": lambda t: [t, t]}, "joints.j0.*2 numbers where 1 are wanted"),
+    ],
+)
+def test_inputs_that_no_member_has_are_refused_before_the_first_one(inputs, says):
+    ran = []
+    with pytest.raises((ephs.SimulationError, AssemblyError), match=says):
+        ephs.sweep(
+            ephs.load(CHAIN), {"bodies.rod1.mass": [1.0]}, 0.1, inputs=inputs, progress=lambda *done: ran.append(done)
+        )
+    assert not ran
+
+
+def test_open_ports_want_their_inputs_before_the_first_member():
+    with pytest.raises(AssemblyError, match="p"):
+        ephs.sweep(oscillator(), {"pe.k": [1.0]}, 0.1)
+    found = ephs.sweep(oscillator(), {"pe.k": [1.0]}, 0.1, inputs={"p": {"effort": lambda t, state: 0.0}})
+    assert set(found["status"].values) == {"done"}
 
 
 @pytest.mark.parametrize("paired", [False, True])

@@ -106,8 +106,25 @@ def test_eigenvalues_of_any_matrix(shape, seed):
     assert largest(np.sort_complex(of.eigenvalues(turn)) - np.exp([-1j, 1j])) <= 8.0 * EPS
 
 
+@given(st.integers(2, 8), seeds)
+def test_a_change_of_a_matrix_changes_its_eigenvalues_by_no_more_than_its_condition_says(size, seed):
+    """To first order; of a matrix in very different units by its balanced form. A defective one has no bound."""
+    rng = np.random.default_rng(seed)
+    a, unit, part = rng.standard_normal((size, size)), 10.0 ** rng.uniform(-6.0, 6.0, size), 1e-9
+    a = a * unit[:, None] / unit
+    values, ways, change = of.conditioned_eigen(a)
+    off, scaled = (each / unit[:, None] for each in (a @ ways - ways * values, ways))
+    assert np.all(np.abs(off) <= 1e-10 * np.abs(scaled).max(axis=0))
+    turned = rng.standard_normal((size, size))
+    other = of.eigenvalues(a + part * turned / np.linalg.norm(turned, 2) * unit[:, None] / unit)
+    for value, bound in zip(values, change, strict=True):
+        if part * bound * np.linalg.norm(change) < 1e-4:
+            assert np.abs(other - value).min() <= 4.0 * part * bound
+    assert np.all(of.conditioned_eigen(np.array([[0.0, 1.0], [0.0, 0.0]]))[2] > 1e100)
+
+
 def test_what_has_no_eigenvalues_is_named():
-    for take in (of.eigen, of.eigenvalues, lambda m: of.metric_eigen(m, np.eye(2))):
+    for take in (of.eigen, of.conditioned_eigen, of.eigenvalues, lambda m: of.metric_eigen(m, np.eye(2))):
         with pytest.raises(ArithmeticError, match=r"of a matrix of 2 × 2 .*are not finite"):
             take(np.full((2, 2), np.nan))
     with pytest.raises(ArithmeticError, match="in a positive metric"):
