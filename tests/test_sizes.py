@@ -10,16 +10,16 @@ from tests.rooms import ROOT, SOURCES, size_of
 CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_700,
-    "ephs/exporting": 13_700,
-    "ephs/mechanics": 426_300,
+    "ephs/exporting": 14_100,
+    "ephs/mechanics": 427_100,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
-    "ephs/semantics": 196_300,
-    "ephs/show": 64_400,
+    "ephs/semantics": 196_500,
+    "ephs/show": 64_900,
     "ephs/solve": 127_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 555_900,
+    "tests": 559_300,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

@@ -1,6 +1,7 @@
 """The contest of methods: little is spent on tries, and the method that costs least takes the steps; counted."""
 
 import hypothesis.strategies as st
+import numpy as np
 import pytest
 from hypothesis import given
 
@@ -8,10 +9,12 @@ import ephs
 from benchmarks.touching import bouncing
 from ephs.mechanics.methods import auto, contest
 from ephs.mechanics.methods.contest import Contest
+from ephs.mechanics.methods.marching import March
 from tests.numerics import largest
 from tests.written import scene_of_text
 
 CHANGE, STARTS = 50.0, 200.0
+BALLS = scene_of_text(bouncing(4).scene)
 
 
 def run(made, prices, phases):
@@ -123,3 +126,20 @@ def test_many_bodies_take_the_steps_that_cost_least(rtol, monkeypatch):
     for name in ("PART", "EARLY", "FIRST"):
         monkeypatch.setattr(contest, name, 0.0)
     assert run("auto")[1] > 1.5 * cost
+
+
+@pytest.mark.parametrize(("rtol", "first"), [(1e-3, "semi"), (1e-4, "semi"), (3e-5, "rk54"), (1e-6, "rk87")])
+def test_the_tolerance_says_which_method_begins(rtol, first):
+    assert ephs.simulate(BALLS, 0.01, rtol=rtol, audit="off").stats["chosen"] == first
+
+
+def test_steps_go_on_as_if_each_leg_were_prepared_anew(monkeypatch):
+    monkeypatch.setattr(contest, "FIRST", 10.0)
+    options = {"rtol": 1e-4, "audit": "off"}
+    found = ephs.simulate(BALLS, 0.2, **options)
+    assert found.stats["tries"] > 2
+    monkeypatch.setattr(March, "serves", lambda *_: False)
+    again = ephs.simulate(BALLS, 0.2, **options)
+    assert again.stats["switches"] == found.stats["switches"] and again.stats["steps"] == found.stats["steps"]
+    for name in again.freedoms:
+        np.testing.assert_array_equal(again.joint(name).coordinate, found.joint(name).coordinate)
