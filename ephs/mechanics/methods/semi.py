@@ -24,6 +24,7 @@ from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.relations import onsager
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.kept import once
+from ephs.solve.march.lagged import AHEAD
 from ephs.solve.march.records import MarchControl, Status
 from ephs.solve.running.control import Control
 
@@ -45,9 +46,10 @@ ARRAYS: Final = arrays(
         [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0],
         [0.0, 0.0, 0.25, 0.25, 0.0], [0.0, 0.0, *_LAST],
     ]),
-    np.array([0.0, 0.0, _LAST[0] - 0.5, _LAST[1] - 0.5, _LAST[2], 0.0]),
+    np.array([-_LAST[1], 0.0, _LAST[0] - 0.5, _LAST[1] - 0.5, _LAST[2], _LAST[1]]),
 )  # fmt: skip
-"""The explicit coefficients as `ephs.solve.march.Tableau`; the estimate is by weights of order 2, (0, ½, ½, 0)."""
+"""The explicit coefficients as `ephs.solve.march.Tableau`; the estimate is by weights of order 2, (0, ½, ½, 0), and by
+what the stage ahead, with its weight, misses of what acts at the end (`ephs.solve.march.lagged.AHEAD`)."""
 SCHEME: Final = np.array([
     [0.0, 0.0, 0.0, 0.0, 0.0],
     [0.0, ALPHA, 0.0, 0.0, 0.0],
@@ -114,16 +116,17 @@ class Semi:
             return eq.rates(state.t + part * h, state.q, y)
 
         self._base[:], self._start[:] = state.q, y0
-        for i in range(1, len(scheme["a"])):
-            before, anew = self._y.copy(), i < len(c) and not AGAIN[i]
+        for i, (node, again) in enumerate([*zip(c[1:], AGAIN[1:], strict=True), (1.0, 0)], 1):
+            before, anew = self._y.copy(), not again
             if anew and not eq.constant:
                 y = y0 + h * (scheme["a"][i, :i] @ self._k[:i])
                 v, r, heats, _ = np.split(y, np.cumsum([eq.nv, eq.n, eq.ns]))
-                eq.load(state.t + (0.0 if eq.held else float(c[i]) * h), eq.advance(state.q, v), r, heats)
+                eq.load(state.t + (0.0 if eq.held else float(node) * h), eq.advance(state.q, v), r, heats)
             eq.evaluations += anew
             status = int(stage(i, h))
             if status == Status.DEPENDENT:
                 before, y1[:] = evaluated(rates_at, scheme["a"], c, h, y0, k)
+                k[0] = k[AHEAD]
                 return before
             eq.refuse(status, eq.engine.failed)
         k[:], y1[:] = self._k, self._y

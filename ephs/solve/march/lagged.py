@@ -6,6 +6,7 @@ Russo, J. Sci. Comput. 68 (2016) 975-1001.
 """
 
 from abc import ABC, abstractmethod
+from typing import Final
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
@@ -50,6 +51,11 @@ class Lagged(ABC):
         """Write base·exp(v), of v in y, to q."""
 
 
+AHEAD: Final = 3
+"""The stage that says what acts at a step's end, by rates without losses. Row 0 of k keeps these, the last row those at
+the end itself."""
+
+
 @staged
 def stage(on: Evaluator, step: MarchStep, lagged: Lagged, i: Integer) -> Integer:
     """Evaluate a stage into its row of k; return a status."""
@@ -60,6 +66,7 @@ def stage(on: Evaluator, step: MarchStep, lagged: Lagged, i: Integer) -> Integer
         combine(on, step, i)
         control.evaluations = control.evaluations + 1
         status.value, control.component = lagged.observe(on, motion, step.base, y, step.q)
+        on.when(on.same(i, AHEAD), lambda: copy(on, lagged.seen, k.row(0)))
 
     def resist() -> None:
         copy(on, lagged.seen, k.row(i))
@@ -81,15 +88,24 @@ def stage(on: Evaluator, step: MarchStep, lagged: Lagged, i: Integer) -> Integer
     return status.value
 
 
-def end(on: Evaluator, step: MarchStep, lagged: Lagged) -> None:
-    """Write the step's end to y and q."""
-    combine(on, step, step.tableau.a.columns)
-    lagged.advance(on, step.motion, step.base, step.y, step.q)
+@staged
+def end(on: Evaluator, step: MarchStep, lagged: Lagged) -> Integer:
+    """Write the step's end to y and q, and the rates without losses there to the last row of k; return a status.
+
+    A surface that is met late in a step is met by no stage.
+    """
+    motion, control, last = step.motion, step.control, step.tableau.a.columns
+    combine(on, step, last)
+    lagged.advance(on, motion, step.base, step.y, step.q)
+    control.evaluations = control.evaluations + 1
+    status, control.component = lagged.observe(on, motion, step.base, step.y, step.q)
+    copy(on, lagged.seen, step.k.row(last))
+    return status
 
 
 @staged
 def lag(on: Evaluator, step: MarchStep, lagged: Lagged) -> Integer:
-    """Evaluate the stages after the first, and write the step's end to y and q; return a status."""
+    """Evaluate the stages after the first, and the step's end; return a status."""
     at, status = on.counter(1), on.counter(0)
 
     def once() -> Truth:
@@ -97,6 +113,9 @@ def lag(on: Evaluator, step: MarchStep, lagged: Lagged) -> Integer:
         at.value = at.value + 1
         return on.either(on.negate(on.same(status.value, 0)), at.value >= step.tableau.a.columns)
 
+    def finish() -> None:
+        status.value = end(on, step, lagged)
+
     on.repeat(once)
-    end(on, step, lagged)
+    on.when(on.same(status.value, 0), finish)
     return status.value

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ephs.mechanics.methods import radau as implicit
-from ephs.mechanics.methods import tableaux
+from ephs.mechanics.methods import semi, tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.solve.methods.collocation import radau
 from tests.mechanics.embedded import embedded_radau
@@ -135,3 +135,42 @@ def test_a_step_ends_a_step_later(equations, method, h):
     assert not any(count for name, count in made.counts.items() if name not in ("keep", "chosen"))
     attempt = made.step(equations.start(0.5), h)
     assert (attempt.start.t, attempt.end.t, attempt.h) == (0.5, 0.5 + h, h)
+
+
+FALLING = """
+format = 1
+[bodies.ball]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.0, 0.0, {height}]
+[joints.slide]
+type = "prismatic"
+bodies = ["ground", "ball"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+rate = -2.0
+[surfaces.ball]
+body = "ball"
+shape = {{ sphere = 0.1 }}
+stiffness = 1e3
+loss = 0.5
+[surfaces.floor]
+body = "ground"
+shape = {{ plane = {{}} }}
+[contacts.touch]
+surfaces = ["ball", "floor"]
+"""
+
+
+@pytest.mark.parametrize("depth", [-0.01, 0.01, 0.03])
+def test_semi_implicit_steps_see_a_surface_at_their_end_that_no_stage_meets(depth):
+    """The stage ahead knows no acceleration, and is a way of g h²/2 before the end: 5 cm in a step of 0.1 s."""
+    h, gravity, stiffness, mass = 0.1, 9.81, 1e3, 2.0
+    way = 2.0 * h + 0.5 * gravity * h**2
+    equations = equations_of(scene_of_text(FALLING.format(height=0.1 + way - depth)))
+    made = stepper(equations, "semi")
+    attempt, end = made.step(equations.start(0.0), h), -2.0 - gravity * h
+    missed = stiffness / mass * max(depth, 0.0)
+    expected = semi.SEVERE * h / 6.0 * missed / (ATOL + RTOL * abs(end))
+    assert attempt.end.r[0] == pytest.approx(end, abs=1e-12)
+    assert attempt.error == pytest.approx(expected / math.sqrt(made.atol.size), rel=1e-6, abs=1e-6)

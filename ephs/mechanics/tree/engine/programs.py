@@ -165,7 +165,10 @@ def lagged_program(*, looped: bool) -> Program:
         def next_stage() -> None:
             status.value = stage(on, step, drags, i)
 
-        on.when(i < tableau.a.columns, next_stage, lambda: end(on, step, drags))
+        def step_end() -> None:
+            status.value = end(on, step, drags)
+
+        on.when(i < tableau.a.columns, next_stage, step_end)
         return status.value
 
     return Program(
