@@ -16,10 +16,10 @@ CEILINGS = {
     "ephs/operad": 30_600,
     "ephs/semantics": 196_500,
     "ephs/show": 64_900,
-    "ephs/solve": 127_800,
+    "ephs/solve": 127_900,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 559_300,
+    "tests": 559_500,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
