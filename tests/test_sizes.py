@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 127_900,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 559_500,
+    "tests": 559_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

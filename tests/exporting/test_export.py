@@ -264,6 +264,15 @@ def test_what_cannot_be_exported_is_refused_by_name(crank, tmp_path, fault):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("option", [{"until": np.nan}, {"until": -1.0}, {"inputs": 3},
+                                    {"inputs": ["joints.bearing"] * 2}])  # fmt: skip
+def test_options_that_are_none_are_refused_by_name(crank, option):
+    ((key, value),) = option.items()
+    with pytest.raises(ephs.OptionError) as caught:
+        image_of(crank[1], **option)
+    assert caught.value.key == key and caught.value.found is value
+
+
 HARD = """
 format = 1
 [bodies.ball]
@@ -277,6 +286,22 @@ at = [0.0, 0.0, 0.0]
 axis = [0.0, 0.0, 1.0]
 limits = [-0.1, 1.0]
 """
+
+
+def test_a_mass_of_0_that_would_vary_is_refused_by_name():
+    """A body without mass has no inertia that a mass could go with."""
+    frame = """
+[bodies.frame]
+mass = 0.0
+inertia = [0.0, 0.0, 0.0]
+position = [0.0, 0.0, 0.2]
+[joints.weld]
+type = "fixed"
+bodies = ["ball", "frame"]
+at = [0.0, 0.0, 0.2]
+"""
+    with pytest.raises(ephs.ExportError, match=r"bodies\.frame\.mass"):
+        image_of(scene_of_text(HARD + frame), parameters=["bodies.frame.mass"])
 
 
 def test_hard_stops_are_refused_by_name():

@@ -36,7 +36,7 @@ class Contest(Resumable):
     prices
         What a step of each method will cost, about, in evaluations.
     starts
-        What its first steps cost besides.
+        Cost of preparing the first steps of each, in evaluations.
     change
         What it costs to go to another method and back, besides steps.
     wakes

@@ -116,8 +116,8 @@ class March:
         Parameters
         ----------
         limit, left
-            Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look.
-            In a contest it calls ``left`` where another method wins.
+            Limit of h·|λ|, beyond which the leg ends; 0: none. Callback at that end, and where another method wins
+            the contest.
         contest
             It weighs the steps, window by window, and tells where another method takes those that follow.
         """

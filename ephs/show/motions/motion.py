@@ -89,7 +89,7 @@ def nearest(t: Array, times: Array) -> NDArray[np.int64]:
 def poses_at(sol: Any, names: list[str], times: Array) -> dict[str, Array]:
     """Poses (n, 7) of bodies at times: between instants cubic in time, by the poses and velocities there.
 
-    Where velocities do not lead from one instant to the next, as at impacts and in modes, they are straight lines.
+    Straight lines join instants whose velocities contradict the displacement between them, at impacts and in modes.
     """
     t, moving = np.asarray(sol.t, dtype=float), sol.stats.get("method") != "mode"
     return {name: _sampled(t, sol.body(name), times, float(moving)) for name in names}

@@ -141,6 +141,7 @@ def test_steps_taken_back_are_tangents_carried_forward(case, monkeypatch):
     [
         ({"method": "natural"}, "rk54, rk87 or an ephs.Method"),
         ({"times": [0.2, 0.1]}, "ascending"),
+        ({"t0": "x"}, "number"),
         ({"parameters": []}, "one path or several"),
         ({"weights": {"bodies.coupler.position": [1.0]}}, "joint of the tree"),
         ({"weights": {"joints.main.coordinate": [1.0, 2.0, 3.0]}}, "(2, 1)"),
