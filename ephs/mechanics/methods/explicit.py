@@ -130,10 +130,13 @@ class Explicit(ReducedMethod):
         sums = np.array(eq.engine.totals["low" if part else "whole"])
         end = replace(eq.ended(state, y1, state.t + h), account=account)
         closed = eq.closed(end)
-        estimates = [eq.along(h * (weights @ k)[eq.counted]) for weights in self.method.estimates]
-        self._fine[:], self._coarse[:] = estimates[0], estimates[-1]
-        error = float(measure())
-        rough = any(q is state.q for q in self.rough)
+
+        def estimated() -> float:
+            estimates = [eq.along(h * (weights @ k)[eq.counted]) for weights in self.method.estimates]
+            self._fine[:], self._coarse[:] = estimates[0], estimates[-1]
+            return float(measure())
+
+        error, rough = estimated(), any(q is state.q for q in self.rough)
         if eq.engine.looped and not (rough or eq.careful):
             self._open[:], self._shut[:] = end.r, closed.r
             error = max(error, float(drift()))
@@ -142,6 +145,12 @@ class Explicit(ReducedMethod):
                 state, closed, h, allowed, chosen=self.control.step is None, share=self._worth
             )
             error = max(error, missed)
+            found = None if self.lagged is None or part or error > 1.0 else self.lagged.ahead(
+                closed, state.t if eq.held else closed.t
+            )
+            if found is not None:
+                k[-1] = found
+                error = max(error, estimated())
         self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
         if self.lagged is None:
             self._fine[:], self._coarse[:] = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]

@@ -168,6 +168,8 @@ class March:
             The steps get too short, or a state cannot be evaluated.
         """
         eq, c = self.method.equations, self.control
+        if self._lagged and c.fresh:  # others may have used the memory of the last evaluation, which is made again
+            c.fresh, c.evaluations = 0, c.evaluations - 1
         before, sound = c.evaluations, float(c.time)
         found = self._marched(steps)
         eq.evaluations += c.evaluations - before

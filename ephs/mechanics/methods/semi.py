@@ -58,8 +58,8 @@ SCHEME: Final = np.array([
     [0.0, 0.25 * ALPHA, 0.25 - 0.5 * ALPHA, 0.25 - 0.75 * ALPHA, ALPHA],
 ])  # fmt: skip
 """The implicit coefficients."""
-AGAIN: Final = np.array([0, 0, 1, 0, 0])
-"""1 where a stage has the explicit state of the one before."""
+AGAIN: Final = np.array([0, 1, 1, 0, 0])
+"""1 where a stage has the explicit state of the one before: the first one is the step's start."""
 TABLEAU: Final = Tableau(NAME, ORDER, ARRAYS, ARRAYS["a"][:-1].sum(axis=1), float(ORDER))
 """The explicit coefficients, with the nodes at which inputs are taken."""
 
@@ -107,8 +107,8 @@ class Semi:
     ) -> Array:
         """The rates k at the stages of a step, each under the inputs at its node, and y at its end into y1.
 
-        Returns y at the last stage. Stages are explicit where constraints nearly repeat each other. See
-        `ReducedEquations.stages`.
+        Returns y at the last stage. Stages are explicit where constraints nearly repeat each other; else the last row
+        of k is that of the stage ahead, until there is one of `ahead`. See `ReducedEquations.stages`.
         """
         eq, stage, before = self._equations, self._bound_stage(), y0
 
@@ -116,7 +116,7 @@ class Semi:
             return eq.rates(state.t + part * h, state.q, y)
 
         self._base[:], self._start[:] = state.q, y0
-        for i, (node, again) in enumerate([*zip(c[1:], AGAIN[1:], strict=True), (1.0, 0)], 1):
+        for i, (node, again) in enumerate([*zip(c, AGAIN, strict=True), (1.0, 1)]):
             before, anew = self._y.copy(), not again
             if anew and not eq.constant:
                 y = y0 + h * (scheme["a"][i, :i] @ self._k[:i])
@@ -131,6 +131,19 @@ class Semi:
             eq.refuse(status, eq.engine.failed)
         k[:], y1[:] = self._k, self._y
         return before
+
+    def ahead(self, end: ReducedState, t: float) -> Array | None:
+        """The rates without losses at the end of a step, under the inputs at a time; None where constraints nearly
+        repeat each other.
+        """
+        eq, stage = self._equations, self._bound_stage()
+        self._base[:], self._start[:] = end.q, eq.vector(end)
+        eq.load(t, end.q, end.r, end.heats)
+        eq.evaluations += 1
+        if (status := int(stage(0, 0.0))) != Status.DEPENDENT:
+            eq.refuse(status, eq.engine.failed)
+            return self.memory["seen"].copy()
+        return None
 
 
 def semi_implicit(equations: ReducedEquations, control: Control) -> Explicit:
@@ -156,7 +169,7 @@ def _parts(reduced: Reduced) -> Sequence[PackedLink]:
 def _programs(equations: ReducedEquations) -> dict[int, int]:
     """Addresses of M/θ₀ of the components of friction, by their numbers."""
     out: dict[int, int] = {}
-    for number in frictions(equations.engine.tables):
+    for number in frictions(equations.engine.tables).tolist():
         kernel = equations.problem.descriptor.components[number].primitive.kernel
         assert kernel is not None
         assert isinstance(kernel.relation, IrreversibleStep)

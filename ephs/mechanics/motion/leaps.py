@@ -5,7 +5,7 @@ convex shapes are convex along it, so that a search by thirds finds the least: c
 where they are not, an overlap beyond the depth at which a contact has no direction and a run ends.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
@@ -17,6 +17,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor, StateSlot
 from ephs.semantics.systems.kept import once
 from ephs.solve.auditing.audit import LEAP
+from ephs.solve.equations.sparse import Index
 from ephs.solve.result.states import RecordedStates
 from ephs.solve.running.control import SLIVER
 
@@ -38,11 +39,34 @@ class ThinContact:
         Of the box that its points lie in.
     states, gaps
         Relative pose of each point, and its gap.
+    places
+        (points, 3) where the states have the places of points.
+    short
+        (points,) ways in m within a step that pass nothing.
     """
 
     path: Path
     states: tuple[StateSlot, ...]
     gaps: tuple[Gap, ...]
+    places: Index
+    short: Array
+
+    @staticmethod
+    def of(path: Path, points: Sequence[tuple[StateSlot, Gap]]) -> "ThinContact":
+        """Of the states and gaps of its points."""
+        states, gaps = zip(*points, strict=True)
+        places = np.array([np.arange(state.point.stop - 3, state.point.stop) for state in states])
+        return ThinContact(
+            path, states, gaps, places, np.array([min(LEAP * gap.thickness, _middle(gap)) for gap in gaps])
+        )
+
+    def ways(self, solution: "Solution") -> Array:
+        """(n − 1, points) of the points between instants, in m."""
+        if isinstance(solution.states, RecordedStates):
+            places = solution.states.x[:, self.places]
+        else:
+            places = np.stack([_poses(solution, state)[:, 4:] for state in self.states], axis=1)
+        return np.linalg.norm(np.diff(places, axis=0), axis=2)
 
 
 def thin_contacts(descriptor: Descriptor) -> tuple[ThinContact, ...]:
@@ -55,7 +79,7 @@ def thin_contacts(descriptor: Descriptor) -> tuple[ThinContact, ...]:
             if isinstance(gap, Gap) and gap.thickness < np.inf:
                 whole = Path(slot.path[: max(1, len(slot.path) - 2)])
                 found.setdefault(whole, []).append((slot.reads[0], gap))
-        return tuple(ThinContact(path, *zip(*points, strict=True)) for path, points in found.items())
+        return tuple(ThinContact.of(path, points) for path, points in found.items())
 
     return once(descriptor, "thin contacts", read)
 
@@ -75,11 +99,9 @@ def leaps(solution: "Solution", h: float) -> Iterator[tuple[Path, int, float]]:
     whole = share > 1.0 - SLIVER  # of a way that several steps went the middle is not known
     for contact in thin_contacts(problem.descriptor):
         longest = contact.path, 0, 0.0
-        for slot, gap in zip(contact.states, contact.gaps, strict=True):
-            pose = _poses(solution, slot)
-            ways = np.linalg.norm(np.diff(pose[:, 4:], axis=0), axis=1)
-            if np.all(share * ways <= min(LEAP * gap.thickness, _middle(gap))):
-                continue
+        every = contact.ways(solution)
+        for k in np.flatnonzero(~np.all(share[:, None] * every <= contact.short, axis=0)):
+            gap, pose, ways = contact.gaps[k], _poses(solution, contact.states[k]), every[:, k]
             outside = np.asarray(gap.distance(pose.T))
             near = np.minimum(outside[:-1], outside[1:])
             for possible, limit, long in (

@@ -277,3 +277,7 @@ class Table(Generic[Row]):
         assert isinstance(self.integers, ArrayIntegers)
         assert isinstance(self.reals, ArrayReals)
         return self.integers.array, self.reals.array
+
+    def column(self, field: "IntegerField | FunctionField") -> NDArray[np.int64]:
+        """(size,) one integer of all rows, a view."""
+        return self.arrays[0].reshape(-1, self.record.integer_width)[:, field.offset]

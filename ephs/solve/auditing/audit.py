@@ -128,15 +128,15 @@ def _energy(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iter
     """
     ledgers, left = solution.ledgers, solution.stats.get("plain_defect", {}).get("left", 0.0)
     worst = worst_entry(solution.energy_error)
+    if (size := float(solution.energy_error[worst])) <= bounds.energy:
+        return
     # destroyed exergy counts as energy; the environment's is its inflow
     destroyed = {path: ledgers.temperature * made for path, made in ledgers.makers.items()}
     parts = {path: energy for path, energy in ledgers.storages.items() if ledgers.exergies[path].any()} | destroyed
     jump = 1 + int(np.argmax(np.abs(np.diff(solution.energy_error)))) if len(solution) > 1 else 0
     busiest = max(parts, key=lambda path: _step(parts[path], jump), default=None)
     allowed = min(left / ledgers.scale, bounds.accuracy)
-    yield Breach(
-        float(solution.energy_error[worst]), lambda: rounded(solution) / ledgers.scale + allowed, worst, busiest
-    )
+    yield Breach(size, lambda: rounded(solution) / ledgers.scale + allowed, worst, busiest)
 
 
 def _step(values: Array, instant: int) -> float:
@@ -217,10 +217,11 @@ def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> It
     scale, rounding = exchanged(solution, "entropy")
     if not scale:
         return
-    falls = {path: -np.diff(made, prepend=made[:1]) for path, made in ledgers.makers.items()}
-    path = max(falls, key=lambda each: float(falls[each].max()), default=None)
-    instant = worst_entry(falls[path]) if path is not None else 0
-    yield Breach(least / scale, rounding, instant, path)
+    if not least / scale <= PRODUCTION:
+        falls = {path: -np.diff(made, prepend=made[:1]) for path, made in ledgers.makers.items()}
+        path = max(falls, key=lambda each: float(falls[each].max()), default=None)
+        instant = worst_entry(falls[path]) if path is not None else 0
+        yield Breach(least / scale, rounding, instant, path)
     if isolated(solution, "entropy"):
         fall = -np.diff(ledgers.entropy, prepend=ledgers.entropy[:1])
         # times inside a step are ends of shorter ones from its start: less may be made until its own end

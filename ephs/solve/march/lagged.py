@@ -22,7 +22,7 @@ class Lagged(ABC):
     scheme
         (stages, stages): coefficients of Z, lower triangular.
     again
-        (stages,): 1 where Y is that of the stage before.
+        (stages,): 1 where Y is that of the stage before, and of the first stage, whose Y is the step's start.
     seen
         Memory of what `observe` writes.
     reached
@@ -43,7 +43,7 @@ class Lagged(ABC):
     def resist(self, on: Evaluator, motion: Motion, y: Vector, weight: Real, fresh: Truth, out: Vector) -> Integer:
         """Complete ẏ, where rates are those reached and ``weight`` times their own; return a status.
 
-        ``fresh``: whether Y is that of the stage before.
+        ``fresh``: whether the resistances are those of the stage before.
         """
 
     @abstractmethod
@@ -57,13 +57,20 @@ the end itself."""
 
 
 @staged
+def begin(on: Evaluator, step: MarchStep, lagged: Lagged) -> Integer:
+    """Evaluate the start of a step without losses, for its first stage; return a status."""
+    step.control.evaluations = step.control.evaluations + 1
+    status, step.control.component = lagged.observe(on, step.motion, step.base, step.start, step.q)
+    return status
+
+
+@staged
 def stage(on: Evaluator, step: MarchStep, lagged: Lagged, i: Integer) -> Integer:
     """Evaluate a stage into its row of k; return a status."""
     motion, control, h, k, y = step.motion, step.control, step.h, step.k, step.y
     nv, n, status, known = motion.increments, motion.freedoms, on.counter(0), on.same(lagged.again[i], 1)
 
     def observe() -> None:
-        combine(on, step, i)
         control.evaluations = control.evaluations + 1
         status.value, control.component = lagged.observe(on, motion, step.base, y, step.q)
         on.when(on.same(i, AHEAD), lambda: copy(on, lagged.seen, k.row(0)))
@@ -81,31 +88,17 @@ def stage(on: Evaluator, step: MarchStep, lagged: Lagged, i: Integer) -> Integer
             on.loop(n, entry)
 
         on.loop(i, add, start=1)
-        status.value = lagged.resist(on, motion, y, h * lagged.scheme[i, i], known, k.row(i))
+        status.value = lagged.resist(on, motion, y, h * lagged.scheme[i, i], on.both(known, i > 1), k.row(i))
 
+    combine(on, step, i)
     on.when(known, lambda: None, observe)
     on.when(on.same(status.value, 0), resist)
     return status.value
 
 
 @staged
-def end(on: Evaluator, step: MarchStep, lagged: Lagged) -> Integer:
-    """Write the step's end to y and q, and the rates without losses there to the last row of k; return a status.
-
-    A surface that is met late in a step is met by no stage.
-    """
-    motion, control, last = step.motion, step.control, step.tableau.a.columns
-    combine(on, step, last)
-    lagged.advance(on, motion, step.base, step.y, step.q)
-    control.evaluations = control.evaluations + 1
-    status, control.component = lagged.observe(on, motion, step.base, step.y, step.q)
-    copy(on, lagged.seen, step.k.row(last))
-    return status
-
-
-@staged
 def lag(on: Evaluator, step: MarchStep, lagged: Lagged) -> Integer:
-    """Evaluate the stages after the first, and the step's end; return a status."""
+    """Evaluate the stages after the first, where `begin` has been, and finish the step; return a status."""
     at, status = on.counter(1), on.counter(0)
 
     def once() -> Truth:
@@ -113,9 +106,15 @@ def lag(on: Evaluator, step: MarchStep, lagged: Lagged) -> Integer:
         at.value = at.value + 1
         return on.either(on.negate(on.same(status.value, 0)), at.value >= step.tableau.a.columns)
 
-    def finish() -> None:
-        status.value = end(on, step, lagged)
-
     on.repeat(once)
-    on.when(on.same(status.value, 0), finish)
+    on.when(on.same(status.value, 0), lambda: finish(on, step, lagged))
     return status.value
+
+
+@staged
+def finish(on: Evaluator, step: MarchStep, lagged: Lagged) -> None:
+    """Write the step's end to y and q; until that is evaluated, the stage ahead says what acts there."""
+    last = step.tableau.a.columns
+    combine(on, step, last)
+    lagged.advance(on, step.motion, step.base, step.y, step.q)
+    copy(on, step.k.row(0), step.k.row(last))

@@ -9,7 +9,7 @@ from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Variable, Vect
 from ephs.solve.march.account import WHOLE, WORTH, RunAccount, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
 from ephs.solve.march.evaluating import MarchStep, allow
-from ephs.solve.march.lagged import Lagged
+from ephs.solve.march.lagged import Lagged, begin
 from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.newton import filtered
 from ephs.solve.march.records import Ending, MarchControl, Motion, Status, TableauRecord
@@ -45,7 +45,7 @@ def march(
         An `Ending`.
     """
     run = _TrialStep(
-        on, motion, tableau, memory, control, account, stiff, lagged, on.counter(GOING), on.counter(0), on.counter(0)
+        on, motion, tableau, memory, control, account, stiff, lagged, *(on.counter(n) for n in (GOING, 0, 0, 0))
     )
     tries = on.counter(0)
 
@@ -62,7 +62,7 @@ def march(
 @final
 @dataclass(frozen=True, slots=True)
 class _TrialStep:
-    """A trial step and its outcome; `ending` is the march's status."""
+    """A trial step and its outcome; `ending` is the march's status, `ahead` 1 where its end was evaluated last."""
 
     on: Evaluator
     motion: Motion
@@ -75,6 +75,7 @@ class _TrialStep:
     ending: Variable[Integer]
     status: Variable[Integer]
     accepted: Variable[Integer]
+    ahead: Variable[Integer]
 
     @property
     def ended(self) -> Truth:
@@ -118,9 +119,8 @@ class _TrialStep:
 
     def _begin(self, h: Real) -> None:
         """Evaluate the rates at the state, the start of a step."""
-        on = self.on
-        if self.lagged is None:
-            self.status.value = first(on, self.whole(h))
+        on, step = self.on, self.whole(h)
+        self.status.value = first(on, step) if self.lagged is None else begin(on, step, self.lagged)
 
         def open_account() -> None:
             self.status.value = self.motion.open(on, self.account, self.memory.q, self.memory.y)
@@ -228,18 +228,40 @@ class _TrialStep:
 
             on.when(self.sound, weigh)
 
+        def go_on(following: Callable[[], None]) -> None:
+            """Go on with a step that is sound so far and will not be refused."""
+            on.when(on.both(self.sound, on.either(c.grid > 0.0, error.value <= 1.0)), following)
+
+        def look_ahead() -> None:
+            """A surface that is met late in a step is met by no stage: what acts at its end counts, too."""
+            corrected = error.value
+            clear(on, y.part(0, nv))
+            following = replace(step, base=q, start=y, q=m.q2)
+            assert self.lagged is not None
+            self.status.value = begin(on, following, self.lagged)
+            copy(on, self.lagged.seen, step.k.row(self.tableau.a.columns))
+            self.ahead.value = 1
+
+            def again() -> None:
+                measure()
+                error.value = on.maximum(error.value, corrected)
+
+            on.when(self.sound, again)
+
         on.when(self.sound, keep_books)
         on.when(self.sound, settle_end)
         on.when(self.sound, measure)
-        # A step that will be refused needs no correction.
-        right = on.either(c.grid > 0.0, error.value <= 1.0)
-        on.when(on.both(self.sound, right), correct)
+        go_on(correct)
+        if self.lagged is not None and not part:
+            go_on(look_ahead)
         return error.value
 
     def _reject(self) -> None:
         """Count a step that is tried again; end where it gets too short or keeps failing."""
         on, c = self.on, self.control
         c.rejected = c.rejected + 1
+        if self.lagged is not None:
+            c.fresh = 0
 
         def count() -> None:
             c.refusals = c.refusals + 1
@@ -285,7 +307,14 @@ class _TrialStep:
         def inside(wanted: Real) -> None:
             copy(on, m.k.row(0), m.k2.row(0))
             part = replace(self.whole(self.sign * (wanted - c.time)), k=m.k2, y=m.y2, q=m.q2)
-            self.status.value = attempt(on, part, m.errors, m.last, self.stiff, self.lagged)
+            if self.lagged is not None:
+                self.status.value = begin(on, part, self.lagged)
+                self.ahead.value = 0
+
+            def take() -> None:
+                self.status.value = attempt(on, part, m.errors, m.last, self.stiff, self.lagged)
+
+            on.when(self.sound, take)
 
             # Near a change of rank a part may be wrong and the whole right: closing removes transverse components.
             on.when(self.sound, lambda: allow(on, motion, m.errors, m.y, m.y2))
@@ -329,7 +358,7 @@ class _TrialStep:
         clear(on, m.y.part(0, nv))
         copy(on, m.y1.part(nv, size - nv), m.y.part(nv, size - nv))
         c.rough = 0
-        c.fresh = 0 if motion.closes else 1
+        c.fresh = self.ahead.value if self.lagged is not None else 0 if motion.closes else 1
         if not motion.closes:  # Nothing was projected: the last rates are the next first ones.
             copy(on, m.k.row(self.tableau.a.columns), m.k.row(0))
             copy(on, m.y.part(nv, nv), m.k.row(0).part(0, nv))

@@ -11,13 +11,19 @@ import numpy as np
 from ephs.operad import Path
 from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.descriptor import ComponentSlot
+from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, StateSlot
+from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.systems.kept import once
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord
 
 FIELDS = ("flux_linkage", "magnetic_flux")
 """Kinds of fluxes: where nothing acts on one, it is the field of a permanent magnet, which no motion exchanges."""
+KINETIC, POTENTIAL, THERMAL = 1, 2, 3
+"""Kinds of energies of storages."""
+AMOUNTS = ("entropy", "volume", "momentum")
+"""Kinds of states that have a ledger of their own, where they are numbers."""
 STILL = 1e-9
 """Least fraction of the energies that counts as exchanged, above the rounding of systems at rest."""
 
@@ -96,8 +102,8 @@ class Ledgers:
         still = STILL * float(np.abs(v).max())
         if moved > still:
             return moved
-        exchanged = [np.abs(energy - energy[0]) for energy in self.storages.values()]
-        return max(still, float(np.max(np.sum(exchanged, axis=0), initial=0.0))) or 1.0
+        held = np.array([*self.storages.values(), 0.0 * v])
+        return max(still, float(np.abs(held - held[:, :1]).sum(axis=0).max())) or 1.0
 
     def defect(self, mechanical: bool) -> Array:
         """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work, too.
@@ -117,63 +123,100 @@ class Ledgers:
         return np.sum([e - e[0] for e in energies], axis=0)  # differences first: a sum of large energies would round
 
 
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Books:
+    """What ledgers read of the records of a system, by the numbers of its components.
+
+    Parameters
+    ----------
+    paths
+        Of all components.
+    storages, environments
+        Storages; those of the environment among them.
+    makers, workers
+        Irreversible components; those that do work over a step.
+    kind
+        (components,) the kind of its energy, 0 of what has none in a ledger.
+    exchanging
+        States of a storage whose charges the environment has, by its number.
+    amounts
+        One of `AMOUNTS`, the storage that has it, and its place in the states.
+    engines
+        See `Ledgers`.
+    """
+
+    paths: tuple[Path, ...]
+    storages: tuple[int, ...]
+    environments: tuple[int, ...]
+    makers: tuple[int, ...]
+    workers: tuple[int, ...]
+    kind: Index
+    exchanging: Mapping[int, tuple[StateSlot, ...]]
+    amounts: tuple[tuple[str, int, int], ...]
+    engines: bool
+
+    @staticmethod
+    def of(d: Descriptor) -> "_Books":
+        """Of a flat system."""
+        acted, engines, kind = _acting(d), False, np.zeros(len(d.components), dtype=np.int64)
+        parts = [(number, slot.primitive) for number, slot in enumerate(d.components)]
+        storages = [number for number, part in parts if isinstance(part, Storage)]
+        for number in storages:
+            slot = d.components[number]
+            charged = [{ENTROPY, VOLUME} & dict(state.quantity.charges).keys() for state in slot.reads]
+            moving = any(state.quantity.parity < 0 for state in slot.reads) and not _permanent(slot, acted)
+            kind[number] = THERMAL if any(charged) else KINETIC if moving else POTENTIAL
+            engines = engines or (len(charged) > 1 and any(charged))
+        environments = [number for number, part in parts if isinstance(part, Storage) and part.environment]
+        kind[environments] = 0
+        reads = {number: d.components[number].reads for number in storages}
+        outer = {k: tuple(state for state in states if state.quantity.environment) for k, states in reads.items()}
+        return _Books(
+            tuple(slot.path for slot in d.components), tuple(storages), tuple(environments),
+            tuple(number for number, part in parts if isinstance(part, Irreversible)),
+            tuple(number for number, part in parts if isinstance(part, Reversible) and part.working),
+            kind, {number: states for number, states in outer.items() if states},
+            tuple(
+                (state.quantity.kind, number, state.point.start) for number, states in reads.items() for state in states
+                if state.quantity.kind in AMOUNTS and state.point.stop - state.point.start == 1
+            ), engines,
+        )  # fmt: skip
+
+
 def ledgers(problem: Problem, record: RunRecord) -> Ledgers:
     """Ledgers of a run's records."""
-    n = record.t.size
-    reference = problem.reference
-    kinetic, potential, thermal, environment, exergy, entropy = (np.zeros(n) for _ in range(6))
-    storages: dict[Path, Array] = {}
-    makers: dict[Path, Array] = {}
-    workers: dict[Path, Array] = {}
-    entropies: dict[Path, Array] = {}
-    amounts: dict[str, dict[Path, Array]] = {"entropy": entropies, "volume": {}, "momentum": {}}
-    exergies: dict[Path, Array] = {}
-    engines, acted = False, _acting(problem)
-    for number, slot in enumerate(problem.descriptor.components):
-        primitive = slot.primitive
-        if isinstance(primitive, Irreversible):
-            makers[slot.path] = record.energies[:, number]
-        if isinstance(primitive, Reversible) and primitive.working:
-            workers[slot.path] = record.energies[:, number]
-        if not isinstance(primitive, Storage):
-            continue
-        exchanged: Array | None = None  # most storages are not involved: no arrays for them
-        for state in slot.reads:
-            if state.quantity.environment:
-                share = record.x[:, state.point] @ reference.intensive(state.quantity)
-                exchanged = share if exchanged is None else exchanged + share
-            values = record.x[:, state.point]
-            if state.quantity.kind in amounts and values.shape[1] == 1:
-                book = amounts[state.quantity.kind]
-                book[slot.path] = book.get(slot.path, 0.0) + values[:, 0]
-            if state.quantity.kind == "entropy":
-                entropy = entropy + values[:, 0]
-        if primitive.environment:
-            storages[slot.path] = np.zeros(n) if exchanged is None else exchanged
-            environment = environment + storages[slot.path]
-            exergies[slot.path] = np.zeros(n)
-            continue
-        energy = storages[slot.path] = record.energies[:, number]
-        exergies[slot.path] = energy if exchanged is None else energy - exchanged
-        exergy = exergy + exergies[slot.path]
-        charged = [{ENTROPY, VOLUME} & dict(state.quantity.charges).keys() for state in slot.reads]
-        if any(charged):
-            thermal, engines = thermal + energy, engines or len(charged) > 1
-        elif any(state.quantity.parity < 0 for state in slot.reads) and not _permanent(slot, acted):
-            kinetic = kinetic + energy
-        else:
-            potential = potential + energy
+    d, reference, nothing = problem.descriptor, problem.reference, np.zeros(record.t.size)
+    books = once(d, "books", lambda: _Books.of(d))
+    paths, columns = books.paths, list(record.energies.T)
+    shares = {
+        k: sum((record.x[:, state.point] @ reference.intensive(state.quantity) for state in states), start=nothing)
+        for k, states in books.exchanging.items()
+    }
+    energies = {k: columns[k] for k in books.storages} | {k: shares.get(k, nothing) for k in books.environments}
+    free = {k: energies[k] - share for k, share in shares.items()} | dict.fromkeys(books.environments, nothing)
+    kept: dict[str, dict[Path, Array]] = {kind: {} for kind in AMOUNTS}
+    for kind, number, at in books.amounts:
+        kept[kind][paths[number]] = kept[kind].get(paths[number], 0.0) + record.x[:, at]
+    alone = books.kind > 0
+    alone[list(free)] = False
+    makers, workers = ({paths[k]: columns[k] for k in numbers} for numbers in (books.makers, books.workers))
     heat, work, supplied, made, least = record.ledgers.T
     return Ledgers(
-        kinetic, potential, thermal, environment, exergy, entropy, heat, work, supplied, made, least,
-        storages, makers, workers, entropies, amounts["volume"], amounts["momentum"], exergies, reference.temperature,
-        engines,
+        *(record.energies.sum(axis=1, where=books.kind == kind) for kind in (KINETIC, POTENTIAL, THERMAL)),
+        environment=sum((energies[k] for k in books.environments), start=nothing),
+        exergy=sum(free.values(), start=record.energies.sum(axis=1, where=alone)),
+        entropy=sum(kept["entropy"].values(), start=nothing),
+        heat=heat, work=work, supplied=supplied, made=made, least=least,
+        storages={paths[k]: energy for k, energy in energies.items()}, makers=makers, workers=workers,
+        entropies=kept["entropy"], volumes=kept["volume"], momenta=kept["momentum"],
+        exergies={paths[k]: free.get(k, energy) for k, energy in energies.items()},
+        temperature=reference.temperature, engines=books.engines,
     )  # fmt: skip
 
 
-def _acting(problem: Problem) -> Counter[int]:
+def _acting(d: Descriptor) -> Counter[int]:
     """Number of components and outer ports with a flow at each effort."""
-    d = problem.descriptor
     ports = (range(j.efforts.start, j.efforts.stop) for j in d.junctions if j.exposed)
     return Counter(chain.from_iterable((*(slot.efforts for slot in d.components), *ports)))
 

@@ -18,7 +18,7 @@ from ephs.mechanics.tree.engine.held import constrain
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist, walk
 from ephs.mechanics.tree.engine.tables import copied
-from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
+from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, CompiledComponent, Tables, Work
 from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.spaces.vectors import dot, sub
 from ephs.semantics.stage import (
@@ -31,6 +31,7 @@ from ephs.semantics.stage import (
     Vector,
     staged,
 )
+from ephs.solve.equations.sparse import Index
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.records import Motion
 
@@ -222,18 +223,16 @@ def _push(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
     on.loop(tables.body.size, body)
 
 
-def frictions(tables: Mapping[str, Any]) -> list[int]:
+def frictions(tables: Mapping[str, Any]) -> Index:
     """Numbers of the components of friction between two links or in a joint, edge by edge."""
-    acting: Any = tables["acting"]
-    rows = [acting[i] for i in range(int(acting.size))]
-    return [int(row.friction) for row in rows if row.friction >= 0 and not row.resisted]
+    friction, resisted = (tables["acting"].column(field) for field in (Acting.friction, Acting.resisted))
+    return friction[(friction >= 0) & (resisted == 0)]
 
 
 def resisting(tables: Mapping[str, Any], onsager: Mapping[int, int]) -> dict[str, Any]:
     """Tables with the addresses of the programs of M/θ₀ of the components of friction, by their numbers."""
-    component: Any = copied(tables["component"])
-    for number, address in onsager.items():
-        component[number].onsager = address
+    component = copied(tables["component"])
+    component.column(CompiledComponent.onsager)[list(onsager)] = list(onsager.values())
     return {**tables, "component": component}
 
 

@@ -22,7 +22,7 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.march.account import RunAccount, worth
 from ephs.solve.march.evaluating import MarchStep
-from ephs.solve.march.lagged import end, stage
+from ephs.solve.march.lagged import begin, finish, stage
 from ephs.solve.march.march import march
 from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.records import MarchControl, TableauRecord
@@ -162,13 +162,16 @@ def lagged_program(*, looped: bool) -> Program:
     ) -> Integer:
         status, step = on.counter(0), MarchStep(motion, tableau, control[0], base, start, h, k, y, q)
 
-        def next_stage() -> None:
+        def first() -> None:
+            status.value = begin(on, step, drags)
+
+        def following() -> None:
             status.value = stage(on, step, drags, i)
 
-        def step_end() -> None:
-            status.value = end(on, step, drags)
+        def later() -> None:
+            on.when(i < tableau.a.columns, following, lambda: finish(on, step, drags))
 
-        on.when(i < tableau.a.columns, next_stage, step_end)
+        on.when(i > 0, later, first)
         return status.value
 
     return Program(

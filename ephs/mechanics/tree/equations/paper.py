@@ -187,10 +187,11 @@ class PaperStates:
         momenta = {i: initial[link.momentum.path] for i, link in enumerate(reduced.places) if link.momentum is not None}
         if not any(map(np.any, momenta.values())):
             return rates
-        twists: dict[int, Array] = {-1: np.zeros(6)}
+        given, twists = list(momenta), {-1: np.zeros(6)}
+        moving = np.linalg.solve(tables.inertia[given], np.array(list(momenta.values()))[..., None])[..., 0]
         roots = _roots(tables.inertia)  # what hardly has inertia knows little of its twist
-        for i, momentum in momenta.items():
-            twists[i] = np.linalg.solve(tables.inertia[i], momentum)
+        for i, twist in zip(given, moving, strict=True):
+            twists[i] = twist
             columns: list[Array] = []
             freedoms: list[int] = []
             carried, here = np.eye(6), i

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.mechanics.tree.finding.frames import Frames, frames_of
+from ephs.mechanics.tree.finding.roles import Role
 from ephs.mechanics.tree.finding.wiring import Incidence
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -37,7 +38,8 @@ def tendon_lengths(frames: Frames, state: Mapping[Path, Array]) -> Iterator[tupl
     """
     wiring = frames.wiring
     whole: dict[int, Array] = {}
-    for number, slot in enumerate(wiring.components):
+    for number in (number for number, role in enumerate(frames.roles) if role is Role.OTHER):
+        slot = wiring.components[number]
         if slot.primitive.kernel is not None and slot.primitive.kernel.name == "point_stretch":
             at = wiring.ports[number]["e"]
             whole[at] = whole.get(at, 0.0) + np.linalg.norm(state[slot.reads[0].path][..., -3:], axis=-1)
