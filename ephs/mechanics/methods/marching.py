@@ -168,9 +168,9 @@ class March:
             The steps get too short, or a state cannot be evaluated.
         """
         eq, c = self.method.equations, self.control
+        before, sound = c.evaluations, float(c.time)
         if self._lagged and c.fresh:  # others may have used the memory of the last evaluation, which is made again
             c.fresh, c.evaluations = 0, c.evaluations - 1
-        before, sound = c.evaluations, float(c.time)
         found = self._marched(steps)
         eq.evaluations += c.evaluations - before
         if self._kept is not None:
@@ -387,6 +387,7 @@ class March:
         """Go on from a snapshot."""
         for name, array in self._taken():
             array[:] = snapshot[name]
+        self.account[0].begins = 0  # books were opened where the run began
 
     @property
     def counts(self) -> Counts:

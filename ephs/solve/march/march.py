@@ -203,8 +203,7 @@ class _TrialStep:
             )  # fmt: skip
 
         def settle_end() -> None:
-            if motion.closes:
-                copy(on, y.part(nv, n), m.open)
+            copy(on, y.part(nv, n), m.open)
             self.status.value = motion.settle(on, m.q, y, q)
 
         def measure() -> None:
@@ -249,7 +248,8 @@ class _TrialStep:
             on.when(self.sound, again)
 
         on.when(self.sound, keep_books)
-        on.when(self.sound, settle_end)
+        if motion.closes:
+            on.when(self.sound, settle_end)
         on.when(self.sound, measure)
         go_on(correct)
         if self.lagged is not None and not part:
