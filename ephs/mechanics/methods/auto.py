@@ -89,7 +89,7 @@ class Auto(ReducedMethod):
         factors, solutions = costs(n, count)
         prices = {self._explicit.name: stages}
         if serves:
-            prices[SEMI] = LAGGED + 4
+            prices[SEMI] = LAGGED + 3
         prices["radau"] = ITERATIONS * (count + solutions) + factors + MATRICES
         first = SEMI if serves and self.control.rtol.value > HALFWAY else self._explicit.name
         self._take(self._explicit.name)  # for single steps
