@@ -2,10 +2,11 @@
 
 import json
 import resource
-import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -83,21 +84,27 @@ def simulate(model, options, **more):
 
 
 @pytest.fixture
-def copies(monkeypatch, tmp_path):
-    """Every entry is written at once; what the journal was after each is kept."""
-    made: list[Path] = []
+def copies(monkeypatch):
+    """Every entry is written at once; functions that write anew what the journal was after each."""
+    made: list[Callable[[], Path]] = []
     write = journal.Written.write
 
-    def copied(self, *entry):
+    def noted(self, *entry):
         write(self, *entry)
-        made.append(tmp_path / f"copy-{len(made)}")
-        shutil.copy(self._path, made[-1])
+        made.append(partial(beginning, self._path, self._path.stat().st_size))
 
     monkeypatch.setattr(journal, "EVERY", -1.0)
     monkeypatch.setattr(journal.os, "fsync", lambda handle: None)
-    monkeypatch.setattr(journal.Written, "write", copied)
+    monkeypatch.setattr(journal.Written, "write", noted)
     monkeypatch.setattr("ephs.solve.running.loop.BURST", 3)
     return made
+
+
+def beginning(path, size):
+    """A file of the first bytes of another one, to which entries were only appended."""
+    found = path.with_name("copy")
+    found.write_bytes(path.read_bytes()[:size])
+    return found
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -106,7 +113,7 @@ def test_a_run_goes_on_from_any_entry_to_the_very_same_numbers(name, copies, tmp
     whole = simulate(model, RUNS[name])
     assert same(simulate(model, RUNS[name], journal=tmp_path / "run.journal"), whole)
     for copy in [copies[len(copies) // 3], copies[-2], copies[-1]]:
-        again = simulate(model, RUNS[name], journal=copy)
+        again = simulate(model, RUNS[name], journal=copy())
         assert same(again, whole)
         assert counts(again) == counts(whole)  # not one evaluation more, nor a matrix
 
@@ -117,7 +124,7 @@ def test_a_run_that_goes_from_method_to_method_goes_on_too(copies, tmp_path):
     assert {"semi", "radau"} <= {switch["to"] for switch in whole.stats["switches"]}
     assert same(simulate(model, options, journal=tmp_path / "run.journal"), whole)
     for copy in copies[:: max(1, len(copies) // 6)]:
-        again = simulate(model, options, journal=copy)
+        again = simulate(model, options, journal=copy())
         assert same(again, whole) and counts(again) == counts(whole)
 
 
@@ -130,9 +137,9 @@ def test_a_system_goes_on_too(copies, tmp_path, damped):
         whole = simulate(damped, options)
         simulate(damped, options, journal=tmp_path / f"{method}-{step}")
         middle = tmp_path / "middle"
-        shutil.copy(copies[len(copies) // 2], middle)
+        copies[len(copies) // 2]().rename(middle)
         for copy in copies[:: max(1, len(copies) // 6)]:
-            again = simulate(damped, options, journal=copy)
+            again = simulate(damped, options, journal=copy())
             assert same(again, whole) and counts(again) == counts(whole)
         found = ephs.load_solution(middle, damped)
         assert np.array_equal(found.t, whole.t[: len(found)])
@@ -187,7 +194,7 @@ def test_a_method_that_cannot_say_where_it_stands_begins_anew(copies, tmp_path):
     options = {"method": method, "step": 0.02}
     whole = simulate(SCENE, options)
     simulate(SCENE, options, journal=tmp_path / "run.journal")
-    middle = copies[len(copies) // 2]
+    middle = copies[len(copies) // 2]()
     assert 0 < len(ephs.load_solution(middle)) < len(whole)
     assert read_journal(middle).snapshot is None
     assert same(simulate(SCENE, options, journal=middle), whole)
