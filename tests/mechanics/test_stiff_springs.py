@@ -136,6 +136,28 @@ def test_a_stiff_spring_that_carries_something_along_is_stretched_without_oscill
     assert sizes[-stretch] > 1.0, "the control"
 
 
+LEAKING = Pattern.from_text(
+    "q: displacement; p: momentum, exposed; p1: momentum; p2: momentum; s: entropy; pe(q); pkc(q, p=p1); "
+    "mass(p); mf(p=p2, s); env(s); apart(a=p1, b=p, c=p2)"
+)
+
+
+@pytest.mark.parametrize("every", [True, False], ids=["steps", "instants"])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7])
+def test_a_mass_whose_spring_gives_way_does_not_oscillate(rtol, every):
+    """Oil and its valve: a spring of k behind a damper of d, pulled with F: v tends to F/d, (k/d)² > 4 k/m."""
+    apart = ephs.constraint({"a": Q.momentum, "b": Q.momentum, "c": Q.momentum}, [[1.0, -1.0, 1.0]])
+    k, d, pull, until = 1e4, 10.0, 50.0, 2.0
+    system = LEAKING(
+        pe=lib.spring(k=k), pkc=lib.pkc(), mass=lib.point_mass(m=1.0), mf=lib.friction(d=d),
+        env=lib.environment(), apart=apart,
+    )  # fmt: skip
+    run = {"inputs": {"p": {"flow": pull}}, "method": "natural4", "rtol": rtol, "atol": rtol}
+    sol = ephs.simulate(system, until, save_at=None if every else [1.6, until], audit="warn", **run)
+    assert sol["mass.p"][-1] == pytest.approx(pull / d, abs=100.0 * rtol)
+    assert sol.stats["longest_step"] * np.sqrt(k) > 10.0  # else there is nothing to tell apart
+
+
 @pytest.mark.parametrize("by_hand", [False, True], ids=["scene", "system"])
 @pytest.mark.parametrize(
     ("stiffness", "options"),

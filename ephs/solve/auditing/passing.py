@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 TURNED = 10.0
 """Angle in rad by which an oscillation may go on in a step at most: no method resolves one and a half turns."""
 PLACES = 3
-"""Number of pairs of instants that are looked at."""
+"""Number of pairs of instants that are looked at, of those that are farthest apart: steps are longest there."""
 
 
 @final
@@ -57,15 +57,17 @@ class Passed:
 def passed_over(solution: "Solution", h: float, allowed: float) -> Passed | None:
     """Oscillations that steps of h s pass over, with energy before and after them; None where there are none.
 
-    Energies above the allowed part of the gross energies are checked by the rates of all momenta: a spring that is
-    stretched without a force that moves it back does not oscillate.
+    Energies above the allowed part of the gross energies are checked by the rates of all states: neither does a spring
+    oscillate that is stretched without a force that moves it back, nor a mass that stretches none.
     """
     problem = solution.problem
     if problem is None or len(solution) < 2 or not _may_be(solution, h):
         return None
     worst: Passed | None = None
     scale = max(solution.ledgers.scale, trembling(solution) / STILL)  # what is less counts as at rest
-    for i in np.unique(np.linspace(0, len(solution) - 2, PLACES).astype(int)).tolist():
+    gaps = np.abs(np.diff(solution.t))
+    wide = np.flatnonzero(gaps >= 0.5 * gaps.max())
+    for i in wide[np.linspace(0, wide.size - 1, min(PLACES, wide.size)).astype(int)].tolist():
         for pulls in (lambda _: None, lambda k: _pull(solution, problem, k)):
             both = [oscillations(problem, problem.descriptor.pack(solution.state_at(k)), pulls(k)) for k in (i, i + 1)]
             held = [(of, np.where(of.rates * h > TURNED, of.energies, 0.0)) for of in both if of is not None]

@@ -60,8 +60,9 @@ def fastest_of(problem: Problem, x: Array) -> tuple[float, Path] | None:
 def oscillations(problem: Problem, x: Array, pull: Array | None = None) -> Oscillations | None:
     """The oscillations about the states x (point_size,); None where nothing oscillates, or there is too much.
 
-    Springs that losses hold back, or that move on slowly with all else, are stretched without oscillating: with the
-    rates of momenta ``pull`` (effort_size,) in N or N m, energies are no more than these say.
+    Springs that losses hold back, or that move on slowly with all else, are stretched without oscillating, and so do
+    masses move on whose springs give way, such as oil through a valve: with the rates of all states ``pull``
+    (effort_size,), of momenta in N or N m, energies are no more than these say.
     """
     d = problem.descriptor
     moving = np.zeros(d.effort_size, dtype=bool)
@@ -87,9 +88,11 @@ def oscillations(problem: Problem, x: Array, pull: Array | None = None) -> Oscil
     efforts = stored_efforts(d, problem.reference, x)
     known = np.array([efforts.get(i, 0.0) for i in range(d.effort_size)])
     push = np.sum([rates[at].T @ known[at] for _, at, _ in springs], axis=0) @ modes
+    speed = (span @ modes).T @ inertia @ np.where(moving, known, 0.0)
     if pull is not None:
         push = np.minimum(np.abs(push), np.abs((span @ modes).T @ pull))
-    speed = (span @ modes).T @ inertia @ np.where(moving, known, 0.0)
+        jerk = np.abs(np.sum([rates[at].T @ matrix @ pull[at] for _, at, matrix in springs], axis=0) @ modes)
+        speed = np.divide(jerk, squares, out=np.abs(speed), where=squares * np.abs(speed) > jerk)
     omega = np.sqrt(np.maximum(squares, 0.0))
     stiffest = np.argmax([np.sum(modes * (part @ modes), axis=0) for part in parts], axis=0)
     potential = np.divide(push, omega, out=np.zeros_like(push), where=omega > 0.0)

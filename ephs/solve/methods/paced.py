@@ -20,6 +20,7 @@ from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.methods.starts import unknowns_away
 from ephs.solve.posing.breakpoints import NEAR
+from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord, record_of
 from ephs.solve.running.control import Control, Grid
@@ -103,7 +104,10 @@ class Paced:
         if self._step is not None:
             end, least = self._single(state, h)
             return Attempt(state, end, h, 0.0, least)
+        cut = self._cut
         coarse, _ = self._single(state, h)
+        if self._cut > cut:  # it is its halves, and would be compared with itself
+            raise SolveError(Outcome.DIVERGED, "", f"{h:.3g} s")
         middle, first = self._single(state, 0.5 * h)
         end, second = self._single(middle, 0.5 * h)
         off, worst = self._off(state, coarse, end)

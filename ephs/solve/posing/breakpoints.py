@@ -124,6 +124,10 @@ class Breakpoints:
             self._found.append(change)
         return self._next(t)
 
+    def followed(self, t: float, h: float) -> float:
+        """Length of a step of at most h seconds from t that passes over no pulse of a function of time."""
+        return h if self._probe is None else self._probe.followed(t, h)
+
     def _next(self, t: float) -> float:
         if self._sign > 0.0:
             k = bisect_left(self._times, t + self.near)

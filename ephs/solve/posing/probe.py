@@ -5,11 +5,13 @@ one point to the next much faster than before, the place is found by bisection. 
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
 
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.posing.problem import State
 from ephs.solve.running.snapshot import Snapshot
 
@@ -25,6 +27,9 @@ SMALL = 1e-6
 """Fraction of the largest value so far below which a change is ignored."""
 SHARE = 0.1
 """Least share of the change between two points, however near, that makes it a jump."""
+MISSED = 0.75
+"""Part of the course of a function that the parabola through three points of a step, at its quarters, may leave out: of
+a pulse that no stage meets, everything."""
 KEPT = "values", "last", "before", "largest", "width"
 """Numbers of a course that journals keep."""
 RESOLVED = 0.25
@@ -158,6 +163,26 @@ class SignalProbe:
             return None
         return None
 
+    def followed(self, t: float, h: float) -> float:
+        """Length of a step from t, of h seconds or a part, in which parabolas follow the functions of time.
+
+        Estimates of errors know of a longer one only what its stages meet: of a short pulse, nothing.
+        """
+        timed = [course for course in self._courses if not course.asked.stateful]
+        largest = np.concatenate([[0.0], *(course.largest for course in timed)])
+        count, n, seen = 2 ** int(np.ceil(np.log2(max(4.0, h / self._width)))), 2, list[Array]()
+        with suppress(Exception):  # raised again at the step that evaluates it
+            while timed and (n := 2 * n) <= count:
+                for k in range(len(seen), n + 1):
+                    when = self._within(t + self._sign * h * k / count)
+                    seen.append(np.concatenate([[0.0], *(course.asked.at(when, None) for course in timed)]))
+                course, s = np.array(seen), np.linspace(-2.0, 2.0, n + 1)
+                weights = np.array([0.5 * s * (s - 1.0), 1.0 - s * s, 0.5 * s * (s + 1.0)])
+                missed = np.abs(course - weights.T @ course[n // 4 : n : n // 4]).sum(axis=0)
+                if (missed > np.maximum(MISSED * np.abs(course - course[n // 2]).sum(axis=0), SMALL * largest)).any():
+                    return 0.25 * h * n / count
+        return h
+
     def _changes(self, after: float, h: float, state: State | None) -> list[Change]:
         """Fast changes between the last point and the next."""
         found: list[Change] = []
@@ -189,7 +214,7 @@ class SignalProbe:
             share = abs(b[j] - a[j])
             if share < SHARE * whole:
                 steep = abs(most[1] - most[0]) < RESOLVED * h
-                return Change(asked.name, *most) if steep else None
+                return Change(asked.name, self._within(self._at), when) if steep else None
             if share > 0.5 * whole:
                 most = before, after
         return Change(asked.name, after, after)

@@ -198,6 +198,8 @@ class RunLoop(Generic[S]):
             # No tiny remainder for a last step.
             h = self.h if rest > 1.01 * self.h else rest if rest <= 1.0000001 * self.h or grid else 0.5 * rest
             cut = end != self.until and h < self.h
+            if self.policy and (followed := max(self.breakpoints.followed(self.t, h), control.least)) < h:
+                h, cut = followed, True
             exact = grid.h if grid and abs(h - grid.h) <= self.breakpoints.near else h
             try:
                 attempt = self.stepper.step(self.state, self.sign * exact)
