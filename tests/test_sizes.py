@@ -11,15 +11,15 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_700,
     "ephs/exporting": 14_100,
-    "ephs/mechanics": 427_100,
+    "ephs/mechanics": 427_600,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
-    "ephs/semantics": 196_500,
+    "ephs/semantics": 196_600,
     "ephs/show": 64_900,
-    "ephs/solve": 127_900,
+    "ephs/solve": 129_300,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 559_700,
+    "tests": 561_300,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

@@ -145,8 +145,10 @@ class Explicit(ReducedMethod):
                 state, closed, h, allowed, chosen=self.control.step is None, share=self._worth
             )
             error = max(error, missed)
-            found = None if self.lagged is None or part or error > 1.0 else self.lagged.ahead(
-                closed, state.t if eq.held else closed.t
+            found = (
+                None
+                if self.lagged is None or part or error > 1.0
+                else self.lagged.ahead(closed, state.t if eq.held else closed.t)
             )
             if found is not None:
                 k[-1] = found
