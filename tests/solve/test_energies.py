@@ -5,7 +5,7 @@ import pytest
 
 import ephs
 from benchmarks.cells import conducting
-from ephs import Pattern, Reference, junction, library
+from ephs import Pattern, Reference, library
 from ephs.operad import quantity as Q
 from ephs.semantics.descriptor.descriptor import Input, descriptor_of
 from ephs.semantics.verdicts.conduction import conductances
@@ -138,8 +138,7 @@ def test_steps_of_conduction_alone_need_one_iteration_and_keep_the_energy():
     sol = run(conducting(3, 4), rtol=1e-6)
     assert sol.stats["iterations"] == sol.stats["steps"] + sol.stats["rejected"]
     assert sol.energy_error.max() <= 64 * ROUNDING and sol.stats["least_production"] >= -1e-12
-    junctions = {f"s{k}": junction(Q.entropy) for k in range(2)}
-    pattern = Pattern(junctions, {"n0_0": {"s": "s0"}, "other": {"s": "s1"}, "link": {"a": "s0", "b": "s1"}})
+    pattern = Pattern.from_text("s0: entropy; s1: entropy; n0_0(s=s0); other(s=s1); link(a=s0, b=s1)")
     node = library.thermal_capacity(c1=293.15 * 10.0, c2=10.0)
     control = run(pattern(n0_0=node, other=node, link=RADIATING), rtol=1e-6)
     assert control.stats["iterations"] > control.stats["steps"]

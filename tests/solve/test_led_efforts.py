@@ -4,17 +4,14 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs import Pattern, junction, quantity
+from ephs import Pattern
 from ephs import library as lib
 from ephs.solve.methods import radau
 from ephs.solve.result import ports
 from tests.written import scene_of_text
 
 ROUNDED = 1e-9
-COIL = Pattern(
-    junctions={"b": junction(quantity.flux_linkage, exposed=True), "s": junction(quantity.entropy)},
-    boxes={"coil": {"b": "b"}, "wire": {"b": "b", "s": "s"}, "room": {"s": "s"}},
-)
+COIL = Pattern.from_text("b: flux_linkage, exposed; s: entropy; coil(b); wire(b, s); room(s)")
 ARM = """
 format = 1
 name = "arm"
@@ -92,13 +89,9 @@ def test_another_curvature_of_its_energy_would_show(monkeypatch):
 
 def test_an_effort_that_reads_states_rises_with_them():
     """The current of one coil leads that of another: b₁ = e^{−t/2}, b₂ = 3 b₁²."""
-    pattern = Pattern(
-        junctions={
-            "a": junction(quantity.flux_linkage), "b": junction(quantity.flux_linkage, exposed=True),
-            "s": junction(quantity.entropy),
-        },
-        boxes={"one": {"b": "a"}, "wire": {"b": "a", "s": "s"}, "two": {"b": "b"}, "room": {"s": "s"}},
-    )  # fmt: skip
+    pattern = Pattern.from_text(
+        "a: flux_linkage; b: flux_linkage, exposed; s: entropy; one(b=a); wire(b=a, s); two(b); room(s)"
+    )
     system = pattern(one=lib.inductor(l=2.0), wire=lib.resistor(r=1.0), two=lib.inductor(l=3.0), room=lib.environment())
     sol = ephs.simulate(
         system, 2.0, initial={"one.b": 1.0, "two.b": 3.0}, method="radau", rtol=1e-9, atol=1e-9,
@@ -110,10 +103,8 @@ def test_an_effort_that_reads_states_rises_with_them():
 
 def test_only_what_depends_on_a_lost_derivative_is_lost():
     """Of two coils that nothing ties the one whose current turns has no voltage there, the other has."""
-    ports = {name: junction(quantity.flux_linkage, exposed=True) for name in "ab"}
-    system = Pattern(junctions=ports, boxes={"one": {"b": "a"}, "two": {"b": "b"}})(
-        one=lib.inductor(l=2.0), two=lib.inductor(l=3.0)
-    )
+    pattern = Pattern.from_text("a: flux_linkage, exposed; b: flux_linkage, exposed; one(b=a); two(b)")
+    system = pattern(one=lib.inductor(l=2.0), two=lib.inductor(l=3.0))
     sol = ephs.simulate(
         system, 1.0, initial={"one.b": 1.0}, method="radau", save_at=[0.0, 0.5, 1.0], jumps=[0.5],
         inputs={"a": {"effort": lambda t: abs(t - 0.5)}, "b": {"effort": np.sin}},

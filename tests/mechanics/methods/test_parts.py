@@ -88,8 +88,7 @@ def test_bodies_and_joints_of_a_system_have_the_names_of_their_boxes():
 
 
 def test_weights_that_differ_are_forces_of_their_own():
-    junctions = {"p": junction(MOMENTUM), "other": junction(MOMENTUM)}
-    pattern = Pattern(junctions=junctions, boxes={"a": {"p": "p"}, "b": {"p": "other"}})
+    pattern = Pattern.from_text("p: body_momentum; q: body_momentum; a(p); b(p=q)")
     system = pattern(a=rigid_body(1.0, [1, 1, 1]), b=rigid_body(2.0, [1, 1, 1], gravity=(0, 0, 0)))
     found = reduced_of(problem_of(system))
     assert not found.gravity.any()

@@ -105,9 +105,7 @@ def test_values_out_of_their_range_are_refused(path, value):
 def test_states_of_a_system_have_paths_too():
     """Of vector spaces, by entry where they have several numbers; other numbers stay."""
     body = ephs.mechanics.rigid_body(2.0, [0.1, 0.2, 0.3])
-    system = ephs.Pattern(junctions={"p": ephs.junction(ephs.quantity.body_momentum)}, boxes={"it": {"p": "p"}})(
-        it=body
-    )
+    system = ephs.Pattern.from_text("p: body_momentum; it(p)")(it=body)
     found = varied(system, {"it.ke.p[4]": 3.0, "it.ke.p[0]": 0.5})
     assert [read(found, f"it.ke.p[{k}]") for k in range(6)] == [0.5, 0.0, 0.0, 0.0, 3.0, 0.0]
     for path in ("it.ke.p", "it.ke.p[6]", "it.pe.q[0]"):
@@ -136,11 +134,8 @@ def test_elements_of_beams_have_no_law_of_a_joint():
 
 
 def test_components_of_a_system_have_paths_too():
-    oscillator = ephs.Pattern(
-        junctions={"q": ephs.junction(ephs.quantity.displacement), "p": ephs.junction(ephs.quantity.momentum)},
-        boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
-    )
-    system = ephs.Pattern(junctions={}, boxes={"osc": {}})(
+    oscillator = ephs.Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")
+    system = ephs.Pattern.from_text("osc()")(
         osc=oscillator(pe=lib.spring(k=1.5), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
     )
     for model in (system, system.flatten()):
