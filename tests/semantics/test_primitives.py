@@ -107,32 +107,6 @@ def test_the_conditions_hold_of_drawn_storages(kind, data, seed):
     _conditions(data.draw(storages(interface)), np.random.default_rng(seed))
 
 
-# ---- the relations that the contract prints --------------------------------------------------------------------
-
-
-def flows(name, **efforts):
-    """Flows by port at given efforts, of a gyrator or an irreversible process."""
-    primitive = made(name)
-    bundle = primitive.bundle
-    e = np.array([efforts[str(port)] for port in bundle.ports], dtype=float)
-    x = {port: np.array([0.7]) for port in primitive.reads}
-    f = primitive.flow(x, e, Reference()) if primitive.kind == "irreversible" else primitive.structure(x)[0] @ e
-    return {str(port): float(f[where][0]) for port, where, _ in bundle.items()}
-
-
-def test_signs_of_the_irreversible_processes():
-    theta = 293.15 + 10.0
-    assert flows("friction", p=3.0, s=10.0) == pytest.approx({"p": 0.6, "s": -1.8 / theta})
-    assert flows("rotational_friction", p=3.0, s=10.0) == pytest.approx({"p": 0.9, "s": -2.7 / theta})
-    assert flows("resistor", b=3.0, s=10.0) == pytest.approx({"b": 15.0, "s": -45.0 / theta})
-    assert flows("pipe_loss", g=3.0, s=10.0) == pytest.approx({"g": 33.0, "s": -99.0 / theta})
-    assert flows("laminar_leak", v1=5.0, v2=2.0, s=10.0) == pytest.approx({"v1": 3e-3, "v2": -3e-3, "s": -9e-3 / theta})
-    hot, cold = 293.15 + 20.0, 293.15 - 5.0
-    assert flows("heat_transfer", s1=20.0, s2=-5.0) == pytest.approx(
-        {"s1": -3.0 * (cold - hot) / hot, "s2": -3.0 * (hot - cold) / cold}
-    )
-
-
 @pytest.mark.parametrize(("name", "state", "energy", "effort"), [
     ("spring", 2.0, 3.0, 3.0), ("point_mass", 2.0, 1.0, 1.0), ("rotor", 2.0, 20.0, 20.0),
     ("capacitor", 0.3, 0.15, 1.0), ("inductor", 0.4, 0.2, 1.0), ("reluctance", 2.0, 8.0, 8.0),
