@@ -23,6 +23,7 @@ from ephs.show import (
 from ephs.show.plots.panels import Curve, Panel
 from ephs.show.plots.series import ANGLE, motion_lines, thinned, within_a_turn
 from ephs.show.plots.signals import MOST, PanelGroup, packed
+from tests.numerics import seeds
 from tests.scenes import shipped
 from tests.show.conftest import Altered
 
@@ -83,7 +84,7 @@ def test_thinning_keeps_ends_and_extremes():
 
 @given(
     length=st.integers(1, 9000),
-    seed=st.integers(0, 2**32 - 1),
+    seed=seeds,
     shorter=st.integers(0, 1),
     count=st.integers(1, 12),
 )
@@ -106,7 +107,7 @@ def test_packed_signals_are_the_solution(length, seed, shorter, count):
         assert values.max() == np.float32(curve.values.max()) and values.min() == np.float32(curve.values.min())
 
 
-@given(st.integers(0, 2**32 - 1), st.floats(0.0, 40.0))
+@given(seeds, st.floats(0.0, 40.0))
 def test_angles_within_a_turn_differ_by_whole_turns_and_lines_end_where_they_jump(seed, speed):
     angles = np.cumsum(np.random.default_rng(seed).uniform(-1.0, 1.0, 200)) + np.linspace(0.0, speed, 200)
     found = within_a_turn(angles)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from ephs.mechanics.elements.contact import lever
 from ephs.mechanics.shapes.gap import (
@@ -26,8 +25,8 @@ from ephs.semantics.derive.tape import over_step
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage.plain import PLAIN
+from tests.numerics import seeds
 
-SEEDS = st.integers(0, 2**32 - 1)
 ROUNDING = 4e-13
 """Of some two hundred operations, relative to the lengths that they begin with: 8 n ε."""
 ROUND = {
@@ -79,7 +78,7 @@ def drawn(rng, slender):
 
 
 @pytest.mark.parametrize("name", ROUND)
-@given(seed=SEEDS)
+@given(seed=seeds)
 @settings(max_examples=15, deadline=None)
 def test_slopes_of_round_shapes_are_wrenches(name, seed):
     rng, gap = np.random.default_rng(seed), ROUND[name]
@@ -110,7 +109,7 @@ FOUND = {
 
 @pytest.mark.parametrize("first", [True, False])
 @pytest.mark.parametrize("name", FOUND)
-@given(seed=SEEDS)
+@given(seed=seeds)
 @settings(max_examples=25, deadline=None)
 def test_slopes_of_features_are_along_wrenches(name, first, seed):
     """The points that are searched are stationary, so nothing but the size of the slope differs.
@@ -138,7 +137,7 @@ def errors(sizes, pose, length, parallel, passes):
 
 
 @pytest.mark.parametrize("slender", [1.0, 10.0, 50.0])
-@given(seed=SEEDS)
+@given(seed=seeds)
 @settings(max_examples=60, deadline=None)
 def test_slopes_of_segments_are_wrenches(slender, seed):
     """To rounding where they are not slender, whatever their angle."""
@@ -149,7 +148,7 @@ def test_slopes_of_segments_are_wrenches(slender, seed):
     assert np.abs(slope(gap, pose) - wrench(gap, pose)).max() <= rounding + (left if slender > 1.0 else 0.0)
 
 
-@given(SEEDS)
+@given(seeds)
 @settings(max_examples=60, deadline=None)
 def test_slopes_of_edges_are_wrenches_and_moments_about_the_common_normal(seed):
     """Moments only where they are nearly parallel, which lengthens the gap."""
@@ -170,7 +169,7 @@ def test_slopes_of_edges_are_wrenches_and_moments_about_the_common_normal(seed):
         assert np.abs(np.array([axes[2], [0.0, 0.0, 1.0]]) @ rest[:3]).max() <= most + ROUNDING * moment
 
 
-@given(SEEDS)
+@given(seeds)
 @settings(max_examples=60, deadline=None)
 def test_gaps_of_segments_change_by_no_more_than_their_points_move(seed):
     """So they are continuous, where axes come to be parallel, too."""

@@ -5,7 +5,6 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
@@ -15,6 +14,7 @@ from ephs.mechanics.shapes.hull import inside_of
 from ephs.mechanics.shapes.pairs import PAIRS, ROUNDED, touches
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from tests.numerics import seeds
 
 SHAPES = ("plane", "sphere", "capsule", "cylinder", "box", "mesh")
 NEW = [pair for pair in PAIRS if {"mesh", "cylinder"} & set(pair) and "plane" not in pair]
@@ -80,7 +80,7 @@ def drawn(rng, kind):
 
 
 @pytest.mark.parametrize("pair", NEW, ids="-".join)
-@given(seed=st.integers(0, 2**32 - 1))
+@given(seed=seeds)
 @settings(max_examples=12, deadline=None)
 def test_the_least_gap_is_the_distance(pair, seed):
     """At poses where cores are about as far apart as their radii, and sides, caps and faces often nearly parallel."""
