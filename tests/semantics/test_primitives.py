@@ -14,7 +14,7 @@ from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.bundles.bundle import Bundle
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.testing import interfaces, irreversibles, reversibles, storages
-from tests.numerics import largest, seeds
+from tests.numerics import generators, largest
 from tests.semantics.subspace import assert_dirac
 from tests.semantics.zoo import QP, drag
 
@@ -47,16 +47,16 @@ def test_every_primitive_of_the_library_is_tested():
 
 
 @pytest.mark.parametrize("name", library.__all__)
-@given(seed=seeds)
-def test_the_conditions_hold_of_the_library(name, seed):
-    _conditions(made(name), np.random.default_rng(seed))
+@given(rng=generators)
+def test_the_conditions_hold_of_the_library(name, rng):
+    _conditions(made(name), rng)
 
 
-@given(st.data(), seeds)
-def test_the_conditions_hold_of_what_is_drawn(data, seed):
+@given(st.data(), generators)
+def test_the_conditions_hold_of_what_is_drawn(data, rng):
     interface = data.draw(interfaces(min_ports=1, max_ports=3))
     kind = data.draw(st.sampled_from([reversibles, irreversibles]))
-    _conditions(data.draw(kind(interface)), np.random.default_rng(seed))
+    _conditions(data.draw(kind(interface)), rng)
 
 
 def _conditions(primitive, rng):
@@ -100,11 +100,11 @@ def _conditions(primitive, rng):
 @given(
     st.sampled_from(["momentum", "displacement", "entropy", "pose", "direct_pose", "body_momentum"]),
     st.data(),
-    seeds,
+    generators,
 )
-def test_the_conditions_hold_of_drawn_storages(kind, data, seed):
+def test_the_conditions_hold_of_drawn_storages(kind, data, rng):
     interface = library.power_ports(x=getattr(Q, kind))
-    _conditions(data.draw(storages(interface)), np.random.default_rng(seed))
+    _conditions(data.draw(storages(interface)), rng)
 
 
 @pytest.mark.parametrize(("name", "state", "energy", "effort"), [

@@ -95,7 +95,7 @@ def test_rates_of_energies_are_temperatures_times_those_of_entropies(name):
     y = stores.numbers(x)
     slopes = stores.slopes(y)
     assert stores.warm.size and np.all(slopes[stores.warm] != 1.0)
-    np.testing.assert_allclose(stores.entropies(y), x, rtol=0.0, atol=64 * ROUNDING)
+    assert largest(stores.entropies(y) - x) <= 64 * ROUNDING
     plain = Integral.of(model)
     assert plain is not None
     found = -own.residuals(y[None], np.zeros((1, y.size)), inputs[None])[0]
