@@ -3,7 +3,6 @@
 import sys
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,11 +11,11 @@ import pytest
 import ephs
 from ephs.mechanics.runs.check import check_model
 from tests.numerics import largest
+from tests.scenes import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from examples.gallery import UNTIL, entries  # noqa: E402 - examples lie beside the package
+from examples.gallery import UNTIL, entries
 
 ENTRIES = entries()
 FACTS = {}

@@ -1,7 +1,6 @@
 """Components in larger systems, against closed forms."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +8,7 @@ import pytest
 import ephs
 from ephs import Pattern
 from tests.numerics import largest
+from tests.scenes import ROOT
 
 
 def assembled(text, **components):
@@ -51,7 +51,7 @@ def test_a_magnet_couples_a_coil_to_a_wheel(parts):
 
 
 def test_the_page_of_the_documentation_runs():
-    page = (Path(__file__).parents[2] / "docs/modelica.md").read_text()
+    page = (ROOT / "docs/modelica.md").read_text()
     *cells, refused = re.findall(r"```\{code-cell\} python\n(.*?)```", page, flags=re.DOTALL)
     names: dict[str, object] = {}
     for cell in cells:
