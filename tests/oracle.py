@@ -22,6 +22,7 @@ from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.systems.system import System
+from tests.numerics import largest
 
 __all__ = ["Oracle", "Unsolved"]
 
@@ -159,7 +160,7 @@ class Oracle:
     def _turning(self, x: State, rates: Array) -> Array:
         """Ċ along rates of the states, given at their junctions."""
         moved = {path: rates[where] for path, where in self.where.items()}
-        fastest = max((float(np.abs(v).max()) for v in moved.values() if v.size), default=0.0)
+        fastest = max((float(largest(v)) for v in moved.values() if v.size), default=0.0)
         if not fastest > 0.0:
             return np.zeros((self.multipliers, self.size))
 
@@ -264,4 +265,4 @@ def _positive(sizes: Array) -> Array:
 
 
 def _relative(change: Array, of: Array) -> float:
-    return float(np.abs(change).max(initial=0.0)) / max(float(np.abs(of).max(initial=0.0)), 1e-300)
+    return float(largest(change, initial=0.0)) / max(float(largest(of, initial=0.0)), 1e-300)

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.methods.registry import METHODS
@@ -54,11 +54,7 @@ def contents(sol) -> dict:
 
 def oscillator():
     """A damped oscillator whose spring is a function of one's own."""
-    boxes = {"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}, "mf": {"p": "p", "s": "s"}}
-    pattern = Pattern(
-        junctions={"q": junction(Q.displacement), "p": junction(Q.momentum), "s": junction(Q.entropy)},
-        boxes={**boxes, "env": {"s": "s"}},
-    )
+    pattern = Pattern.from_text("q: displacement; p: momentum; s: entropy; pe(q); ke(p); pkc(q, p); mf(p, s); env(s)")
     hard = ephs.storage({"q": Q.displacement}, lambda q: 0.5 * q**2 + 0.25 * q**4)
     return pattern(pe=hard, ke=lib.point_mass(m=1.0), pkc=lib.pkc(), mf=lib.friction(d=0.1), env=lib.environment())
 

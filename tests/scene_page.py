@@ -1,11 +1,11 @@
 """Write the tables of scene files into their page: `python -m tests.scene_page`."""
 
 import re
-from pathlib import Path
 
 from ephs.mechanics.scene.reference import scene_tables
+from tests.scenes import ROOT
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
+PAGE = ROOT / "docs" / "scene-file.md"
 
 
 def written(text: str) -> str:

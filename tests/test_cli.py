@@ -21,6 +21,7 @@ from ephs.cli.sweep import sweep
 from ephs.semantics.systems.report import CheckItem
 from ephs.solve.auditing.findings import Audit, Finding
 from examples.failures import CASES, Case
+from tests.typed import typed
 
 
 class FakeSystem:
@@ -123,13 +124,11 @@ def fails_with(error):
     return fail
 
 
-@pytest.mark.parametrize(
-    ("policy", "code", "said"), [((), 4, 1), (("--audit", "warn"), 0, 1), (("--audit", "off"), 0, 0)]
-)
+@pytest.mark.parametrize(("policy", "code", "said"), [("", 4, 1), ("--audit warn", 0, 1), ("--audit off", 0, 0)])
 def test_a_run_that_does_not_pass_its_audit_is_saved_and_exits_with_4(house, monkeypatch, capsys, policy, code, said):
     finding = Finding("energy", 0.5, 1e-9, 0.25, "joints.pin", "take a smaller step")
     monkeypatch.setattr(FakeSolution, "audit", Audit((finding,)))
-    assert cli.main(["run", "crank.toml", "--until", "2", *policy]) == code
+    assert typed(f"run crank.toml --until 2 {policy}") == code
     folder = Path("out/crank")
     assert sorted(file.name for file in folder.iterdir()) == ["report.html", "run.json", "solution.nc", "summary.json"]
     assert capsys.readouterr().err.splitlines().count(f"crank.toml: {finding}") == said
@@ -137,7 +136,7 @@ def test_a_run_that_does_not_pass_its_audit_is_saved_and_exits_with_4(house, mon
 
 def test_run_passes_on_what_was_given_and_leaves_the_defaults_alone(house):
     words = "--until 2 --method natural --step 0.01 --form paper --base free --adjust --out deep/er"
-    assert cli.main(["run", "crank.toml", *words.split()]) == 0
+    assert typed(f"run crank.toml {words}") == 0
     assert house.load == ("crank.toml", {"base": "free", "adjust": True})
     _, until, options = house.simulate
     assert until == 2.0
@@ -168,7 +167,7 @@ def test_run_passes_on_what_was_given_and_leaves_the_defaults_alone(house):
     ],
 )
 def test_bad_words_are_named_and_exit_with_2(house, capsys, words, expected):
-    assert cli.main(words.split()) == 2
+    assert typed(words) == 2
     said = capsys.readouterr()
     assert all(word in said.err for word in expected), said.err
     assert said.out == ""
@@ -177,14 +176,14 @@ def test_bad_words_are_named_and_exit_with_2(house, capsys, words, expected):
 
 def test_a_message_without_the_file_gets_it(house, capsys, monkeypatch):
     monkeypatch.setattr(ephs, "simulate", fails_with(FakeSceneError("method: found 'x'")))
-    assert cli.main(["run", "crank.toml", "--until", "1"]) == 2
+    assert typed("run crank.toml --until 1") == 2
     assert capsys.readouterr().err == "crank.toml: method: found 'x'\n"
 
 
 def test_a_defect_of_the_package_is_not_hidden(house, monkeypatch):
     monkeypatch.setattr(ephs, "simulate", fails_with(ValueError("a defect")))
     with pytest.raises(ValueError, match="a defect"):
-        cli.main(["run", "crank.toml", "--until", "1"])
+        typed("run crank.toml --until 1")
 
 
 @pytest.mark.parametrize(
@@ -201,7 +200,7 @@ def test_a_defect_of_the_package_is_not_hidden(house, monkeypatch):
 )
 def test_what_was_computed_is_saved(house, capsys, monkeypatch, error, code, words):
     monkeypatch.setattr(ephs, "simulate", fails_with(error))
-    assert cli.main(["run", "crank.toml", "--until", "1", "--out", "part"]) == code
+    assert typed("run crank.toml --until 1 --out part") == code
     assert Path("part/solution.nc").is_file()
     assert json.loads(Path("part/summary.json").read_text())["steps"] == 7
     said = capsys.readouterr().err
@@ -211,25 +210,25 @@ def test_what_was_computed_is_saved(house, capsys, monkeypatch, error, code, wor
 
 def test_a_run_that_never_began_is_bad_input(house, capsys, monkeypatch):
     monkeypatch.setattr(ephs, "simulate", fails_with(FakeSimulationError("unknown method", None)))
-    assert cli.main(["run", "crank.toml", "--until", "1"]) == 2
+    assert typed("run crank.toml --until 1") == 2
     assert capsys.readouterr().err == "crank.toml: unknown method\n"
 
 
 def test_an_interrupt_while_loading_exits_with_130(house, monkeypatch):
     monkeypatch.setattr(ephs, "load", fails_with(KeyboardInterrupt()))
-    assert cli.main(["run", "crank.toml", "--until", "1"]) == 130
+    assert typed("run crank.toml --until 1") == 130
 
 
 def test_jumps_are_times(house, capsys):
-    assert cli.main(["run", "crank.toml", "--until", "1", "--jumps", "0.1,0.25"]) == 0
+    assert typed("run crank.toml --until 1 --jumps 0.1,0.25") == 0
     assert house.simulate[2]["jumps"] == [0.1, 0.25]
-    assert cli.main(["run", "crank.toml", "--until", "1", "--jumps", "0.1,soon"]) == 2
+    assert typed("run crank.toml --until 1 --jumps 0.1,soon") == 2
     assert "--jumps 0.1,soon: expected TIME,TIME,... in seconds" in capsys.readouterr().err
 
 
 def test_an_unusable_result_folder_is_told_before_the_run(house, capsys):
     Path("taken").write_text("a file")
-    assert cli.main(["run", "crank.toml", "--until", "1", "--out", "taken"]) == 2
+    assert typed("run crank.toml --until 1 --out taken") == 2
     assert "taken" in capsys.readouterr().err
     assert house.simulate is None
 
@@ -238,7 +237,7 @@ def test_a_missing_extra_keeps_the_data(house, capsys, monkeypatch):
     absent = ModuleNotFoundError("No module named 'matplotlib'", name="matplotlib.pyplot")
     report = SimpleNamespace(write_report=fails_with(absent))
     monkeypatch.setitem(sys.modules, "ephs.show.report", report)
-    assert cli.main(["run", "crank.toml", "--until", "1"]) == 0
+    assert typed("run crank.toml --until 1") == 0
     assert "ephs[viz]" in capsys.readouterr().err
     assert Path("out/crank/solution.nc").is_file()
 
@@ -248,20 +247,20 @@ def test_check_prints_each_law_and_exits_by_the_verdict(house, capsys, monkeypat
     items = [CheckItem("power balance", True, "defect 1e-16"), CheckItem("energy [mf]", ok, "found 0.1")]
     module = SimpleNamespace(check_model=lambda model, initial: SimpleNamespace(items=items, ok=ok))
     monkeypatch.setitem(sys.modules, "ephs.mechanics.runs.check", module)
-    assert cli.main(["check", "crank.toml"]) == code
+    assert typed("check crank.toml") == code
     said = capsys.readouterr().out
     assert all(name in said and detail in said for name, _, detail in items)
     assert ("FAILS" in said) is not ok
 
 
 def test_draw_takes_the_hierarchy_or_its_flattening(house, capsys):
-    assert cli.main(["draw", "crank.toml", "-o", "pictures/a.svg"]) == 0
+    assert typed("draw crank.toml -o pictures/a.svg") == 0
     assert isinstance(house.drawn, FakeSystem)
     assert Path("pictures/a.svg").read_text() == "<svg>"
-    assert cli.main(["draw", "crank.toml", "--flat", "-o", "b.png"]) == 0
+    assert typed("draw crank.toml --flat -o b.png") == 0
     assert house.drawn == "flattened"
     assert capsys.readouterr().out.split() == ["pictures/a.svg", "b.png"]
-    assert cli.main(["draw", "crank.toml", "--opened", "-o", "c.svg"]) == 0
+    assert typed("draw crank.toml --opened -o c.svg") == 0
     assert capsys.readouterr().out.splitlines() == [
         "c.svg",
         "overlapping names and wires: 1",
@@ -273,7 +272,7 @@ def test_a_model_from_a_python_file(house):
     Path("mine.py").write_text("from beside import model\nother = 1\n")
     before = list(sys.path)
     try:
-        assert cli.main(["run", "mine.py:model", "--until", "1"]) == 0
+        assert typed("run mine.py:model --until 1") == 0
     finally:
         sys.modules.pop("beside", None)
     assert isinstance(house.simulate[0], FakeSystem)
@@ -295,7 +294,7 @@ def test_a_model_from_a_python_file(house):
 )
 def test_a_bad_python_file_is_told_without_a_traceback(house, capsys, text, name, expected):
     Path("mine.py").write_text(text)
-    assert cli.main(["check", f"mine.py:{name}"]) == 2
+    assert typed(f"check mine.py:{name}") == 2
     said = capsys.readouterr().err
     assert said.startswith("mine.py:")
     assert all(word in said for word in expected), said
@@ -318,8 +317,8 @@ def test_a_run_that_fails_exits_with_3_says_why_and_saves_what_there_is(tmp_path
     monkeypatch.setattr("ephs.show.report.write_report", lambda solution, folder: None)
     file, out = tmp_path / "failing.py", tmp_path / "out"
     file.write_text(f"from examples.failures import CASES\nmodel = CASES[{number}].model()\n")
-    words = ["--until", f"{case.until}", "--step", f"{case.step}", "--method", case.methods[0], "--out", str(out)]
-    assert cli.main(["run", f"{file}:model", *words]) == 3
+    words = f"--until {case.until} --step {case.step} --method {case.methods[0]} --out {out}"
+    assert typed(f"run {file}:model {words}") == 3
     said = capsys.readouterr().err
     assert "t = " in said and case.outcome.value in said and case.outcome.advice in said
     if "saved what was computed" in said:

@@ -1,11 +1,11 @@
 """`ephs equations` takes the forms of runs, and those of the equations themselves."""
 
-from ephs import cli
 from tests.scenes import ROOT
+from tests.typed import typed
 
 
 def printed(capsys, form):
-    assert cli.main(["equations", str(ROOT / "scenes/heavy-top.toml"), "--form", form]) == 0
+    assert typed(f"equations {ROOT}/scenes/heavy-top.toml --form {form}") == 0
     return capsys.readouterr().out
 
 

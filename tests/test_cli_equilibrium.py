@@ -5,7 +5,7 @@ import json
 import pytest
 
 import ephs
-from ephs.cli import main
+from tests.typed import typed
 
 ROD = """format = 1
 [world]
@@ -25,7 +25,7 @@ force = [-60.0, 0.0, 0.0]
 def test_the_shape_at_rest_is_printed_and_written(tmp_path, capsys):
     file = tmp_path / "rod.toml"
     file.write_text(ROD, encoding="utf-8")
-    assert main(["equilibrium", str(file), "--out", str(tmp_path / "out")]) == 0
+    assert typed(f"equilibrium {file} --out {tmp_path / 'out'}") == 0
     printed = capsys.readouterr().out
     data = json.loads((tmp_path / "out" / "equilibrium.json").read_text())
     expected = ephs.equilibrium(ephs.load(file))
@@ -36,4 +36,4 @@ def test_the_shape_at_rest_is_printed_and_written(tmp_path, capsys):
 
 @pytest.mark.parametrize("found", ["missing.toml", "examples/oscillator.py:damped_oscillator"])
 def test_what_is_no_scene_is_bad_input(found):
-    assert main(["equilibrium", found]) == 2
+    assert typed(f"equilibrium {found}") == 2

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.cli import main
 from ephs.mechanics.sweep.outputs import known_outputs
 from ephs.show.plots.chosen import plot_signals
 from tests.scenes import ROOT
+from tests.typed import typed
 
 CRANK = str(ROOT / "scenes/slider-crank.toml")
 
@@ -18,7 +18,7 @@ CRANK = str(ROOT / "scenes/slider-crank.toml")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("out")
-    assert main(["run", CRANK, "--until", "0.2", "--no-report", "--out", str(made)]) == 0
+    assert typed(f"run {CRANK} --until 0.2 --no-report --out {made}") == 0
     return made
 
 
@@ -27,7 +27,7 @@ def test_no_report_writes_everything_else(folder):
 
 
 def test_info_names_everything_that_the_scene_names(capsys):
-    assert main(["info", CRANK]) == 0
+    assert typed(f"info {CRANK}") == 0
     said = capsys.readouterr().out
     scene = ephs.load(CRANK)
     for name in [*scene.bodies, *scene.joints, *scene.thermal]:
@@ -37,13 +37,13 @@ def test_info_names_everything_that_the_scene_names(capsys):
 
 
 def test_info_lists_states_of_a_system(capsys):
-    assert main(["info", f"{ROOT / 'examples/oscillator.py'}:damped_oscillator"]) == 0
+    assert typed(f"info {ROOT}/examples/oscillator.py:damped_oscillator") == 0
     said = capsys.readouterr().out
     assert all(path in said for path in ("osc.pe.q", "osc.ke.p", "env.s", "kg m/s"))
 
 
 def test_plot_lists_every_signal_and_each_can_be_plotted(folder, capsys):
-    assert main(["plot", str(folder)]) == 0
+    assert typed(f"plot {folder}") == 0
     said = capsys.readouterr().out
     sol = ephs.load_solution(folder / "solution.nc")
     for name in known_outputs(sol.scene):
@@ -63,23 +63,23 @@ def test_plotted_values_are_those_of_the_solution(folder):
 
 @pytest.mark.parametrize(("wrong", "near"), [("joints.bering.rate", "joints.bearing.rate"), ("enrgy", "energy")])
 def test_plot_suggests_signals_of_the_same_kind(folder, capsys, wrong, near):
-    assert main(["plot", str(folder), wrong]) == 2
+    assert typed(f"plot {folder} {wrong}") == 2
     assert near in capsys.readouterr().err
 
 
 def test_suggestions_for_a_joint_are_joints(folder, capsys):
-    assert main(["plot", str(folder), "joints.rod.position"]) == 2
+    assert typed(f"plot {folder} joints.rod.position") == 2
     assert "bodies." not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["", ":", ":dam"])
 def test_a_python_file_without_a_name_tells_its_models(capsys, name):
-    assert main(["info", f"{ROOT / 'examples/oscillator.py'}{name}"]) == 2
+    assert typed(f"info {ROOT}/examples/oscillator.py{name}") == 2
     assert "free_oscillator, damped_oscillator" in capsys.readouterr().err
 
 
 def test_info_says_none_of_fixed_joints_and_zero_of_rounding(capsys):
-    assert main(["info", str(ROOT / "examples/arm.urdf")]) == 0
+    assert typed(f"info {ROOT}/examples/arm.urdf") == 0
     said = capsys.readouterr().out
     (fixed,) = (line for line in said.splitlines() if " fixed " in line)
     assert fixed.endswith("none")
@@ -87,13 +87,13 @@ def test_info_says_none_of_fixed_joints_and_zero_of_rounding(capsys):
 
 
 def test_plot_takes_a_saved_solution(folder, tmp_path, capsys):
-    assert main(["plot", str(folder)]) == 0
+    assert typed(f"plot {folder}") == 0
     listed = capsys.readouterr().out
     saved = tmp_path / "crank.nc"
     saved.write_bytes((folder / "solution.nc").read_bytes())
-    assert main(["plot", str(saved)]) == 0
+    assert typed(f"plot {saved}") == 0
     assert capsys.readouterr().out == listed
-    assert main(["plot", str(saved), "energy"]) == 0
+    assert typed(f"plot {saved} energy") == 0
     assert (tmp_path / "signals.svg").is_file()
 
 
@@ -113,7 +113,7 @@ def test_a_run_that_fails_at_its_start_suggests_no_films(tmp_path, capsys):
     text = (ROOT / "examples/arm.urdf").read_text()
     arm = str(tmp_path / "massless-base.urdf")
     Path(arm).write_text(re.sub(r"<inertial>.*?</inertial>", "", text, count=1, flags=re.DOTALL))
-    assert main(["run", arm, "--base", "free", "--until", "0.1", "--out", str(tmp_path)]) == 3
+    assert typed(f"run {arm} --base free --until 0.1 --out {tmp_path}") == 3
     said = capsys.readouterr()
     assert "root_joint" in said.err
     assert "next:" not in said.out
@@ -127,8 +127,8 @@ def test_inputs_and_states_without_names_are_refused(options):
 
 
 def test_a_model_in_place_of_results_is_answered_with_the_run_to_make(capsys):
-    for words in (["animate", CRANK, "-o", "page.html"], ["plot", CRANK, "energy"]):
-        assert main(words) == 2
+    for words in (f"animate {CRANK} -o page.html", f"plot {CRANK} energy"):
+        assert typed(words) == 2
         said = " ".join(capsys.readouterr().err.split())
         assert "found a model, expected a result folder of ephs run" in said and f"first: ephs run {CRANK}" in said
 
@@ -136,6 +136,6 @@ def test_a_model_in_place_of_results_is_answered_with_the_run_to_make(capsys):
 def test_broken_syntax_has_line_column_and_text(tmp_path, capsys):
     file = tmp_path / "scene.toml"
     file.write_text("format = 1\n[bodies.a]\nmass = 1.8 kg\n")
-    assert main(["check", str(file)]) == 2
+    assert typed(f"check {file}") == 2
     said = capsys.readouterr().err
     assert 'line 3, column 12: found "mass = 1.8 kg"' in said and "units" in said

@@ -5,15 +5,15 @@ import json
 import pytest
 
 import ephs
-from ephs.cli import main
 from tests.scenes import ROOT
+from tests.typed import typed
 
 LOOP = str(ROOT / "scenes/four-bar.toml")
 
 
 def test_the_summary_names_states_and_modes_and_the_file_has_the_matrices(tmp_path, capsys):
     file = tmp_path / "four-bar.json"
-    assert main(["linearize", LOOP, "--at", "equilibrium", "-o", str(file)]) == 0
+    assert typed(f"linearize {LOOP} --at equilibrium -o {file}") == 0
     printed = capsys.readouterr().out
     assert "structure: ẋ = (J − R) Q x + B u" in printed and "damping" in printed and str(file) in printed
     data = json.loads(file.read_text())
@@ -24,8 +24,8 @@ def test_the_summary_names_states_and_modes_and_the_file_has_the_matrices(tmp_pa
 
 def test_a_time_is_run_to_first(tmp_path):
     file = tmp_path / "four-bar.json"
-    words = ["--at", "0.2", "--input", "joints.main", "--output-of", "joints.knee.coordinate", "-o", str(file)]
-    assert main(["linearize", LOOP, *words]) == 0
+    words = f"--at 0.2 --input joints.main --output-of joints.knee.coordinate -o {file}"
+    assert typed(f"linearize {LOOP} {words}") == 0
     data = json.loads(file.read_text())
     scene = ephs.load(LOOP)
     there = scene.at(ephs.simulate(scene, 0.2, save_at=[0.2]), 0.2)
@@ -34,21 +34,20 @@ def test_a_time_is_run_to_first(tmp_path):
 
 
 def test_systems_have_ports(capsys):
-    model = f"{ROOT / 'examples/physics.py'}:motor"
-    assert main(["linearize", model, "--input", "q=effort:1.0"]) == 0
+    model = f"{ROOT}/examples/physics.py:motor"
+    assert typed(f"linearize {model} --input q=effort:1.0") == 0
     assert "rotor.mass.p" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("words", "what"),
-    [(["--at", "soon"], "--at soon"), (["--input", "joints.man"], "joints.main"), (["-o", "a.mat"], ".json, .npz, .nc"),
-     (["--at", "-1"], "--at -1")],
-)  # fmt: skip
+    [("--at soon",) * 2, ("--input joints.man", "joints.main"), ("-o a.mat", ".json, .npz, .nc"), ("--at -1",) * 2],
+)
 def test_bad_words_are_told(words, what, capsys):
-    assert main(["linearize", LOOP, *words]) == 2
+    assert typed(f"linearize {LOOP} {words}") == 2
     assert what in capsys.readouterr().err
 
 
 def test_no_equilibrium_is_told(capsys):
-    assert main(["linearize", str(ROOT / "scenes/slider-crank.toml"), "--at", "equilibrium"]) == 2
+    assert typed(f"linearize {ROOT}/scenes/slider-crank.toml --at equilibrium") == 2
     assert "constant drive of bearing" in capsys.readouterr().err

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import ephs
 from ephs import operad
+from tests.scenes import ROOT
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+DOCS = ROOT / "docs"
 ROOMS = {"library", "mechanics", "operad", "quantity", "semantics", "show", "testing"}
 
 

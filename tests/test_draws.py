@@ -3,11 +3,11 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+from tests.scenes import ROOT
+
 DRAWING = """
 from pathlib import Path
 from hypothesis import given, settings, strategies as st

@@ -1,10 +1,7 @@
 """The first minutes: what one is told, what one is given to start from, and what a slip of the keys leads to."""
 
-import os
 import re
 import runpy
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,7 +12,9 @@ from ephs.cli import commands as cli
 from ephs.cli.new import TEMPLATES
 from ephs.cli.next import EXAMPLES, commands
 from ephs.cli.progress import said_of, seldom
+from tests.processes import printed
 from tests.scenes import ROOT, shipped
+from tests.typed import typed
 
 
 @pytest.fixture
@@ -26,7 +25,7 @@ def here(monkeypatch, tmp_path):
 
 def made(like):
     name = f"my-{like}"
-    assert cli.main(["new", name, "--like", like]) == 0
+    assert typed(f"new {name} --like {like}") == 0
     suffix = Path(TEMPLATES[like][0]).suffix
     return f"{name}{suffix}:{like}" if suffix == ".py" else f"{name}{suffix}"
 
@@ -35,7 +34,7 @@ def made(like):
 def test_what_new_writes_is_sound_and_runs(here, capsys, like):
     model = made(like)
     assert f"ephs run {model} --until 5" in capsys.readouterr().out
-    assert cli.main(["check", model]) == 0
+    assert typed(f"check {model}") == 0
     if like == "oscillator":
         system = runpy.run_path(model.partition(":")[0])["oscillator"]
         solution = ephs.simulate(system, 0.5, initial={"spring.q": 1.0})
@@ -63,7 +62,7 @@ def test_lengths_of_the_closed_loops_can_be_changed(here):
 
 def test_new_never_writes_over_a_file(here, capsys):
     Path("taken.toml").write_text("mine")
-    assert cli.main(["new", "taken"]) == 2
+    assert typed("new taken") == 2
     assert "taken.toml: the file exists" in capsys.readouterr().err
     assert Path("taken.toml").read_text() == "mine"
 
@@ -98,7 +97,7 @@ def test_slips_are_met_with_the_nearest_name(here, capsys, words, expected):
     Path("mine.py").write_text("from ephs import library as lib\nfrom ephs import Pattern\n"
                                "model = Pattern.from_text('s: entropy; env(s)')(env=lib.environment())\n")  # fmt: skip
     capsys.readouterr()
-    assert cli.main(words.split()) == 2
+    assert typed(words) == 2
     said = capsys.readouterr().err
     assert all(word in said for word in expected), said
     assert "Traceback" not in said
@@ -121,7 +120,7 @@ def every_command():
 
 @pytest.mark.parametrize("command", every_command())
 def test_every_command_has_an_example_in_its_help(command, capsys):
-    assert cli.main([*command.split(), "--help"]) == 0
+    assert typed(f"{command} --help") == 0
     said = " ".join(capsys.readouterr().out.split())
     assert all(example in said for example in EXAMPLES[command])
 
@@ -137,7 +136,7 @@ def test_examples_are_calls_of_the_command_and_their_files_exist(example):
 
 
 def test_alone_it_shows_every_command(capsys):
-    assert cli.main([]) == 0
+    assert typed("") == 0
     said = capsys.readouterr().out
     assert all(EXAMPLES[name][0] in said for name in commands(cli.app))
     assert "ephs new my-pendulum" in said
@@ -145,7 +144,7 @@ def test_alone_it_shows_every_command(capsys):
 
 def test_a_run_says_what_to_look_at_next(here, capsys):
     made("spinning-body")
-    assert cli.main(["run", "my-spinning-body.toml", "--until", "0.1"]) == 0
+    assert typed("run my-spinning-body.toml --until 0.1") == 0
     said = capsys.readouterr().out
     for word in ("next:", "out/my-spinning-body/report.html", 'ephs.load_solution("out/my-spinning-body/solution.nc")'):
         assert word in said
@@ -166,25 +165,23 @@ def test_progress_tells_steps_and_the_energy_error_so_far(step):
 
 
 def test_completion_is_written_for_a_shell(here, capsys):
-    assert cli.main(["--install-completion", "--shell", "bash", "--output", "completion.sh"]) == 0
+    assert typed("--install-completion --shell bash --output completion.sh") == 0
     script = Path("completion.sh").read_text()
     assert all(name in script for name in ("sweep", "--until", "equations"))
 
 
-@pytest.mark.parametrize("words", [[], ["--help"], ["new", "--help"], ["rnu"], ["sweep", "--help"]], ids=" ".join)
+@pytest.mark.parametrize("words", ["", "--help", "new --help", "rnu", "sweep --help"])
 def test_what_is_said_first_loads_nothing_heavy(words):
     script = (
-        f"import sys; from ephs.cli import main; main({words!r}); "
-        "print(*[n for n in ('numpy', 'llvmlite', 'scipy', 'sympy', 'pydantic', 'ephs.mechanics') if n in sys.modules],"
-        " file=sys.stderr)"
+        f"import sys; from ephs.cli import main; main({words.split()!r}); "
+        "heavy = ('numpy', 'llvmlite', 'scipy', 'sympy', 'pydantic', 'ephs.mechanics'); "
+        "print('has', *[name for name in heavy if name in sys.modules])"
     )
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment)
-    assert done.stderr.splitlines()[-1] == ""
+    assert printed(script).splitlines()[-1] == "has"
 
 
 def test_a_name_that_is_no_model_is_answered_with_the_models_of_the_file(capsys):
-    assert cli.main(["check", f"{ROOT / 'examples/oscillator.py'}:damped"]) == 2
+    assert typed(f"check {ROOT}/examples/oscillator.py:damped") == 2
     assert "damped is a Pattern" in (said := capsys.readouterr().err) and "free_oscillator, damped_oscillator" in said
 
 
@@ -233,8 +230,8 @@ def test_progress_without_a_terminal_is_some_lines(seconds, most):
 
 def test_a_run_without_a_terminal_tells_its_progress_on_stderr(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("ephs.cli.progress.FIRST", 0.0)
-    words = ["run", "scenes/heavy-top.toml", "--until", "0.02", "--no-report", "--out", str(tmp_path / "top")]
-    assert cli.main(words) == 0
+    words = f"run scenes/heavy-top.toml --until 0.02 --no-report --out {tmp_path / 'top'}"
+    assert typed(words) == 0
     said = capsys.readouterr()
     assert re.search(r"^heavy-top: t = \S+ of 0.02 s, .* after \d+ s$", said.err, re.MULTILINE)
     assert "t = " not in said.out

@@ -1,11 +1,9 @@
 """Who may know whom: the rooms of the package form a house without stairs upwards."""
 
-import subprocess
-import sys
-
 import pytest
 
-from tests.rooms import DOORS, PLACE, ROOT, SOURCES, house, imported, imports_of, module_name, room_of, within
+from tests.processes import printed
+from tests.rooms import DOORS, PLACE, SOURCES, house, imported, imports_of, module_name, room_of, within
 
 HEAVY = (
     "scipy",
@@ -86,8 +84,7 @@ def test_the_syntax_needs_no_numpy():
 
 def test_import_loads_nothing_heavy():
     script = f"import sys, ephs; print(*[name for name in {HEAVY!r} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == []
+    assert printed(script) == "\n"
 
 
 SYSTEM = "from examples.oscillator import damped_oscillator as model"
@@ -97,8 +94,7 @@ SCENE = "model = ephs.load('scenes/heavy-top.toml')"
 def loaded(model):
     """Names of the modules that a process has loaded which runs a model."""
     script = f"import sys, ephs; {model}; ephs.simulate(model, 0.01, step=0.005, audit='off'); print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    return done.stdout.split()
+    return printed(script).split()
 
 
 @pytest.mark.parametrize(("model", "known"), [(SYSTEM, False), (SCENE, True)])

@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.__main__ import TABLES
 from ephs.cli import app
+from tests.scenes import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 TEXTS = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "STYLE")] + sorted((ROOT / "docs").glob("*.md"))
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 TARGETS = set(re.findall(r"^([a-z-]+):", MAKEFILE, re.MULTILINE))

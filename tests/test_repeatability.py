@@ -14,6 +14,7 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.solve.running import loop
 from ephs.solve.running.threads import in_one_thread
+from tests.processes import printed
 from tests.repeat import contents, digest
 from tests.scenes import ROOT, shipped
 
@@ -78,8 +79,7 @@ for module in ("numpy", "sksundae.ida"):
     with threadpool_limits(2, "blas"):
         print(module, seen())
 """
-    said = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, cwd=ROOT, check=True).stdout
-    assert said == "numpy {1}\nsksundae.ida {1}\n"
+    assert printed(text) == "numpy {1}\nsksundae.ida {1}\n"
 
 
 def test_linear_algebra_takes_one_thread_until_the_last_call_is_done():

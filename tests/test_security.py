@@ -16,6 +16,7 @@ import ephs
 from ephs.mechanics.imports import convert
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from tests.fuzz.seeds import LEG, MESH, MJCF, PENDULUM, SDF, URDF
+from tests.scenes import ROOT
 
 NAMES = (
     '"><script>alert(1)</script><img/src=x/onerror=alert(1)>',
@@ -167,7 +168,7 @@ def test_hostile_files_reach_nothing(tmp_path, solution):
         capture_output=True,
         text=True,
         check=True,
-        cwd=Path(__file__).resolve().parents[1],
+        cwd=ROOT,
     )
     found, seen = json.loads(run.stdout.splitlines()[-1])
     read = {name for name, outcome in found.items() if outcome == "model"}

@@ -10,10 +10,10 @@ import ephs
 from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.cli import main
 from ephs.mechanics import joint, rigid_body
 from ephs.operad.messages import legible
 from tests.scenes import ROOT, shipped
+from tests.typed import typed
 
 NONE = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -89,7 +89,7 @@ def test_draw_draws_patterns(tmp_path, capsys):
     lines = ["from ephs import Pattern", "pattern = Pattern.from_text('q: displacement; spring(q); mass(q)')", "n = 3"]
     file.write_text("\n".join(lines))
     picture, same = tmp_path / "pattern.svg", tmp_path / "same.svg"
-    assert main(["draw", f"{file}:pattern", "-o", str(picture)]) == 0
+    assert typed(f"draw {file}:pattern -o {picture}") == 0
     made = Pattern.from_text("q: displacement; spring(q); mass(q)")
     ephs.show.draw(made, same)
     assert picture.read_text() == same.read_text()
@@ -99,7 +99,7 @@ def test_draw_draws_patterns(tmp_path, capsys):
         f"{file}:patern -o {picture}": 'did you mean "pattern"?',
         f"{file}:pattern --flat -o {picture}": "is a Pattern, expected a System or a Scene",
     }.items():
-        assert main(["draw", *words.split()]) == 2
+        assert typed(f"draw {words}") == 2
         assert said in legible(capsys.readouterr().err)
-    assert main(["info", f"{file}:pattern"]) == 2
+    assert typed(f"info {file}:pattern") == 2
     assert "pattern is a Pattern, expected a System or a Scene" in capsys.readouterr().err

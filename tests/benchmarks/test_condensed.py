@@ -17,6 +17,7 @@ from ephs.solve.equations.sparse import equilibrate
 from ephs.solve.methods.natural import Natural
 from ephs.solve.posing.errors import SolveError
 from tests.benchmarks.test_copies import repeating
+from tests.numerics import largest
 
 ROUNDING = float(np.finfo(float).eps)
 
@@ -48,8 +49,8 @@ def distance(model, x, z, other, h):
     matrix, scale = scaled(model, x, z, h)
     sigma = np.linalg.svd(matrix, compute_uv=False)
     condition = sigma[0] / sigma[sigma > 1e-12 * sigma[0]][-1] if sigma.size else 1.0
-    size = np.abs(z / scale).max(initial=1.0)
-    return float(np.abs((z - other) / scale).max(initial=0.0) / (10.0 * condition * ROUNDING * size)), sigma
+    size = largest(z / scale, initial=1.0)
+    return float(largest((z - other) / scale, initial=0.0) / (10.0 * condition * ROUNDING * size)), sigma
 
 
 @settings(max_examples=25)

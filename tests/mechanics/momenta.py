@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ephs.mechanics.scene.model import Body, World, frozen
 from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
-from tests.numerics import seeds
+from tests.numerics import generators
 
 __all__ = ["floating", "momenta"]
 
@@ -29,7 +29,7 @@ def momenta(scene, sol):
 def floating(draw, gravity=(0.0, 0.0, 0.0), **options):
     """Scenes of `mechanisms` with a body that moves and turns in place of the ground."""
     scene = draw(mechanisms(**({"max_bodies": 3} | options)))
-    rng = np.random.default_rng(draw(seeds))
+    rng = draw(generators)
     twist = rng.standard_normal(6)
     base = Body("base", 2.0, frozen(np.diag([0.7, 0.8, 1.1])), frozen(SE3.identity()), frozen(np.zeros(6)))
     bodies = {

@@ -72,21 +72,13 @@ def test_what_differs_is_not_isomorphic(f, g):
 
 def test_a_ring_of_six_is_not_two_rings_of_three():
     """Refinement alone does not tell them apart."""
-    two = Pattern(
-        {f"j{k}": junction(Q) for k in range(6)},
-        {f"b{k}": {"x": f"j{k}", "y": f"j{(k + 1) % 3 + 3 * (k // 3)}"} for k in range(6)},
-    )
-    assert ring(6).isomorphic(two) is None and ring(6).canonical_hash() == two.canonical_hash()
+    two = rings(3, 3)
+    assert rings(6).isomorphic(two) is None and rings(6).canonical_hash() == two.canonical_hash()
 
 
 def test_cells_of_refinement_need_not_be_orbits():
     """A ring of six beside two of three: all boxes look alike, but not every one can take the place of each other."""
-    wires = {f"b{k}": (k, (k + 1) % 6) for k in range(6)}
-    wires |= {f"c{k}": (6 + k, 6 + (k + 1) % 3 + 3 * (k // 3)) for k in range(6)}
-    f = Pattern(
-        {f"j{k}": junction(Q) for k in range(12)}, {b: {"x": f"j{x}", "y": f"j{y}"} for b, (x, y) in wires.items()}
-    )
-    assert f.automorphisms() == 12 * (6 * 6 * 2)
+    assert rings(6, 3, 3).automorphisms() == 12 * (6 * 6 * 2)
 
 
 def test_symmetries_may_have_to_keep_outer_names():
@@ -124,11 +116,10 @@ def test_identities_are_isomorphic_to_identities():
     assert f.isomorphic(Pattern.from_text("q: displacement, exposed; p: momentum, exposed as state; a(q, ~p)")) is None
 
 
-def ring(count):
-    return Pattern(
-        {f"j{k}": junction(Q) for k in range(count)},
-        {f"b{k}": {"x": f"j{k}", "y": f"j{(k + 1) % count}"} for k in range(count)},
-    )
+def rings(*counts):
+    """Side by side."""
+    ends = [(f"j{i}.{k}", f"j{i}.{(k + 1) % count}") for i, count in enumerate(counts) for k in range(count)]
+    return Pattern({x: junction(Q) for x, _ in ends}, {f"b{k}": {"x": x, "y": y} for k, (x, y) in enumerate(ends)})
 
 
 @pytest.mark.parametrize(
@@ -137,8 +128,8 @@ def ring(count):
         (Pattern({}, {}), 1),
         (Pattern({}, {f"b{k}": {} for k in range(5)}), 120),
         (Pattern({"q": junction(Q)}, {f"b{k}": {"x": "q"} for k in range(12)}), math.factorial(12)),
-        (ring(3), 6),
-        (ring(7), 14),
+        (rings(3), 6),
+        (rings(7), 14),
         (Pattern.from_text("q: displacement; a(x=q, y=q); b(x=q, y=~q)"), 2),
         # Three pairs of boxes, each on a junction of its own: swap within pairs, and pairs.
         (

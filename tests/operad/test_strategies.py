@@ -1,9 +1,5 @@
 """What the strategies reach, so that the laws are tested where they could fail."""
 
-import subprocess
-import sys
-from pathlib import Path as File
-
 import pytest
 from hypothesis import Phase, find, given, settings
 from hypothesis import strategies as st
@@ -15,6 +11,7 @@ from ephs.operad import LAWS, Path, Pattern, Quantity
 from ephs.plugin import register
 from ephs.semantics import System
 from ephs.testing import interfaces, law_inputs, nestings, paths, patterns, quantities
+from tests.processes import printed
 
 # To reach something is enough, it need not be small.
 SEARCH = settings(max_examples=20000, database=None, deadline=None, phases=[Phase.generate])
@@ -185,4 +182,4 @@ def test_the_package_may_be_imported_before_hypothesis():
         "from hypothesis import find, strategies as st\n"
         "assert find(st.from_type(ephs.Pattern), lambda p: len(p.boxes) > 1)\n"
     )
-    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True, cwd=File(__file__).parents[2])
+    printed(code, PYTHONWARNINGS="error")

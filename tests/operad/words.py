@@ -26,7 +26,7 @@ from ephs.operad import (
 )
 from tests.operad import models
 from tests.operad.test_documents import BROKEN, BROKEN_TEXT, FINE, described, junction_of
-from tests.operad.test_pattern import ALLOWED, REFUSED
+from tests.operad.test_pattern import ALLOWED, REFUSED, patterns_of
 from tests.operad.test_substitution import MISFITS, UPPER
 
 GOLDEN = File(__file__).with_name("words.json")
@@ -62,21 +62,26 @@ def nested() -> Nesting:
     return Nesting(models.DAMPED, {"osc": models.OSCILLATOR})
 
 
+def spaced(**space: Any) -> Any:
+    """A description whose space is as told."""
+    return described(space={"name": "r", "dim": 1, "size": 1} | space)
+
+
 DOCUMENTS: dict[str, Any] = {
-    "document: dim is no whole number": described(space={"name": "r", "dim": 1.0, "size": 1}),
-    "document: size is text": described(space={"name": "r", "dim": 1, "size": "1"}),
+    "document: dim is no whole number": spaced(dim=1.0),
+    "document: size is text": spaced(size="1"),
     "document: parity is true": described(parity=True),
     "document: kind is a number": described(kind=5),
     "document: space is a list": described(space=[]),
-    "document: space has a key too many": described(space={"name": "r", "dim": 1, "size": 1, "colour": 1}),
+    "document: space has a key too many": spaced(colour=1),
     "document: space lacks its name": described(space={"dim": 1, "size": 1}),
-    "document: space's name is a number": described(space={"name": 1, "dim": 1, "size": 1}),
-    "document: size less than dim": described(space={"name": "r", "dim": 2, "size": 1}),
-    "document: negative dim": described(space={"name": "r", "dim": -1, "size": 1}),
-    "document: parameters are a list": described(space={"name": "r", "dim": 1, "size": 1, "parameters": []}),
-    "document: parameter is text": described(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": "x"}}),
-    "document: parameter is true": described(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": True}}),
-    "document: parameter is infinite": described(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": 1e999}}),
+    "document: space's name is a number": spaced(name=1),
+    "document: size less than dim": spaced(dim=2),
+    "document: negative dim": spaced(dim=-1),
+    "document: parameters are a list": spaced(parameters=[]),
+    "document: parameter is text": spaced(parameters={"p": "x"}),
+    "document: parameter is true": spaced(parameters={"p": True}),
+    "document: parameter is infinite": spaced(parameters={"p": 1e999}),
     "document: pitch is text": junction_of(quantity="relative_pose", pair="screw", pitch="x"),
     "document: pair is a number": junction_of(quantity="relative_pose", pair=1),
     "document: pitch of a hinge": junction_of(quantity="relative_pose", pair="revolute", pitch=1),
@@ -90,6 +95,10 @@ DOCUMENTS: dict[str, Any] = {
     "document: identity is a list": {"format": 1, "identity": []},
     "document: identity's port is text": {"format": 1, "identity": {"q": "displacement"}},
     "document: identity's port without quantity": {"format": 1, "identity": {"q": {}}},
+    "no long message": FINE | {"format": "n" * 2000},
+    "just a long message": FINE | {"format": "n" * 2001},
+    "pitch beside a description": junction_of(quantity={}, pitch=1.0),
+    "format as a list": FINE | {"format": [1]},
 }
 TEXTS = ["", "{", '{"format": 1, "format": 1}', '{"a": {"b": 1, "c": 2, "b": 3}}', '{"format": NaN}', "[-Infinity]"]
 SHOWN: dict[str, Callable[[], object]] = {
@@ -178,14 +187,24 @@ def said(make: Callable[[], object]) -> str:
     return "nothing is refused"
 
 
-LONG: dict[str, Callable[[], object]] = {
+LONG_TEXTS = {
+    "frame without name": "q: angle @ ,",
+    "quantity without name": "q: (",
+    "name without second part": "q.(x)",
+    "name without quotes": '""(x)',
+    "argument without name": "q: relative_pose(,)",
+    "arguments without end": "q: relative_pose(screw pitch=1)",
+    "number in parts": "q: relative_pose(screw, pitch=1.x.2)",
+    "identity with links": "q: angle, exposed; r: angle, exposed; .(q, r); q ~ r",
+    "second description": 'a({); q: {"kind": "x", "space": {"name": "r", "dim": 1, "size": 1}, "parity": 1}',
+    "links of other quantities, two": "a: angle; b: charge; c: angle; d: charge; x(a, b, c, d); c ~ d; a ~ b",
+}
+LONG: dict[str, Callable[[], object]] = patterns_of(LONG_TEXTS) | {
     "long name": lambda: Path(("n" * 201,)),
     "no long name": lambda: Path(("n" * 200,)),
     "long path": lambda: Path(("n",) * 501),
     "no long path": lambda: Path(("n",) * 500),
     "long message": lambda: Pattern({"q": junction(Q)}, {"a": [f"x{k}" for k in range(1000)]}),
-    "no long message": lambda: Pattern.from_dict(FINE | {"format": "n" * 2000}),
-    "just a long message": lambda: Pattern.from_dict(FINE | {"format": "n" * 2001}),
     "path of a number": lambda: Path.of(5),
     "path of text": lambda: Path("ab"),
     "name of a number": lambda: Path((1,)),
@@ -202,8 +221,6 @@ LONG: dict[str, Callable[[], object]] = {
     "no utf-8": lambda: Pattern.from_json(b"\xff\xfe\xfa"),
     "too many digits": lambda: Pattern.from_json('{"format": ' + "9" * 5000 + "}"),
     "key given twice, not the first": lambda: Pattern.from_json('{"c": 2, "b": 1, "b": 3}'),
-    "pitch beside a description": lambda: Pattern.from_dict(junction_of(quantity={}, pitch=1.0)),
-    "format as a list": lambda: Pattern.from_dict(FINE | {"format": [1]}),
     "box that is no text": lambda: Pattern({"q": junction(Q)}, {"a": [1, 2]}),
     "link to nothing that has a name": lambda: Pattern({}, {"a": {}}, [["p", "q"]]),
     "junction renamed to another's name": lambda: models.DAMPED.rename(junctions={"p": "s"}),
@@ -212,17 +229,6 @@ LONG: dict[str, Callable[[], object]] = {
     "port renamed to another's name": lambda: models.DAMPED.rename(ports={"mf": {"p": "s"}}, boxes={"mf": "friction"}),
     "no such port of an identity": lambda: identity().rename(junctions={"y": "z"}),
     "no such inner port of an identity": lambda: identity().rename(junctions={"q": "z"}, ports={".": {"y": "z"}}),
-    "frame without name": lambda: Pattern.from_text("q: angle @ ,"),
-    "quantity without name": lambda: Pattern.from_text("q: ("),
-    "name without second part": lambda: Pattern.from_text("q.(x)"),
-    "name without quotes": lambda: Pattern.from_text('""(x)'),
-    "argument without name": lambda: Pattern.from_text("q: relative_pose(,)"),
-    "arguments without end": lambda: Pattern.from_text("q: relative_pose(screw pitch=1)"),
-    "number in parts": lambda: Pattern.from_text("q: relative_pose(screw, pitch=1.x.2)"),
-    "identity with links": lambda: Pattern.from_text("q: angle, exposed; r: angle, exposed; .(q, r); q ~ r"),
-    "second description": lambda: Pattern.from_text(
-        'a({); q: {"kind": "x", "space": {"name": "r", "dim": 1, "size": 1}, "parity": 1}'
-    ),
     "misfit within an identity": lambda: Nesting(
         Pattern.from_text("q: displacement; a(q)"),
         {"a": Nesting(Pattern.identity({"q": PortType(Q)}), {".": Pattern.from_text("q: angle, exposed; b(q)")})},
@@ -239,9 +245,6 @@ LONG: dict[str, Callable[[], object]] = {
     "box like one of many junctions": lambda: Pattern(
         {"a": junction(Q), "b": junction(Q)}, {"b": {"x": "a", "y": "b"}, "c": {}}
     ),
-    "links of other quantities, two": lambda: Pattern.from_text(
-        "a: angle; b: charge; c: angle; d: charge; x(a, b, c, d); c ~ d; a ~ b"
-    ),
     "misfit of an identity": lambda: identity().substitute({".": Pattern.from_text("q: angle, exposed; b(q)")}),
     "nothing to fill": lambda: Pattern({}, {})(),
     "filled by a number": lambda: models.DAMPED(osc=1, mf=2, env=3),
@@ -254,7 +257,7 @@ def words() -> dict[str, Callable[[], str]]:
     refused |= {f"document: {name}": lambda d=d: Pattern.from_dict(d) for name, d in BROKEN.items()}
     refused |= {name: lambda d=d: Pattern.from_dict(d) for name, d in DOCUMENTS.items()}
     refused |= {f"json: {text}": lambda text=text: Pattern.from_json(text) for text in TEXTS}
-    refused |= {f"text: {text}": lambda text=text: Pattern.from_text(text) for text in BROKEN_TEXT}
+    refused |= patterns_of({f"text: {text}": text for text in BROKEN_TEXT})
     refused |= {f"filling: {name}": lambda f=f: UPPER.substitute(f) for name, f in MISFITS.items()}
     shown = {f"shown: {name}": lambda make=make: str(make()) for name, make in SHOWN.items()}
     return shown | {f"refused: {name}": lambda make=make: said(make) for name, make in (refused | LONG).items()}

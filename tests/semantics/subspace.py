@@ -99,4 +99,4 @@ def assert_dirac(skew: Array, constraint: Array) -> None:
     n, found = len(skew), dirac(skew, constraint)
     form = np.kron([[0.0, 1.0], [1.0, 0.0]], np.eye(n))
     assert found.dimension == n
-    assert np.abs(found.basis.T @ form @ found.basis).max(initial=0.0) <= 1e-13
+    assert largest(found.basis.T @ form @ found.basis, initial=0.0) <= 1e-13

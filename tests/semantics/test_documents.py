@@ -158,15 +158,10 @@ def test_another_number_is_another_system(system, data):
 
 def alone(primitive):
     """A system of one component."""
-    junctions = {str(port): junction(kind.quantity) for port, kind in primitive.interface.items()}
-    wires = {port: f"{'' if kind.power else '~'}{port}" for port, kind in primitive.interface.items()}
-    return System.of(
-        Pattern(
-            {f"j.{name}": j for name, j in junctions.items()},
-            {"box": {port: wire.replace("~", "~j.") if "~" in wire else f"j.{wire}" for port, wire in wires.items()}},
-        ),
-        {"box": primitive},
-    )
+    ports = primitive.interface.items()
+    wires = {port: f"{'' if kind.power else '~'}j.{port}" for port, kind in ports}
+    pattern = Pattern({f"j.{port}": junction(kind.quantity) for port, kind in ports}, {"box": wires})
+    return System.of(pattern, {"box": primitive})
 
 
 @pytest.mark.parametrize("name", library.__all__)
@@ -326,24 +321,23 @@ def test_every_operation_is_written_and_read(word):
 
 # ---- documents from anybody ---------------------------------------------------------------------------------------
 
-PORTS = [["q", {"quantity": "displacement"}]]
+LENGTH = {"quantity": "displacement"}
 
 
-def document(**part):
+def document(ports=(("q", LENGTH),), **part):
     """A system whose one component is as told."""
-    pattern = {"format": 1, "junctions": {"j": {"quantity": "displacement"}}, "boxes": {"a": {"q": "j"}}}
-    return {"format": 1, "parts": [part, {"pattern": pattern, "fillings": {"a": 0}}]}
+    junctions = {name: {"quantity": port["quantity"]} for name, port in ports}
+    wires = {name: f"~{name}" if "exposed" in port else name for name, port in ports}
+    pattern = {"format": 1, "junctions": junctions, "boxes": {"a": wires}}
+    return {"format": 1, "parts": [{"ports": [*ports], **part}, {"pattern": pattern, "fillings": {"a": 0}}]}
 
 
 def storage(energy):
-    return document(storage="s", ports=PORTS, energy=energy)
-
-
-SPRING = {"part": "spring", "ports": PORTS, "parameters": {"k": 1.0}}
+    return document(storage="s", energy=energy)
 
 
 def test_a_document_by_hand():
-    assert System.from_dict(document(**SPRING)).fillings["a"] == library.spring(k=1.0)
+    assert System.from_dict(document(part="spring", parameters={"k": 1.0})).fillings["a"] == library.spring(k=1.0)
     read = System.from_dict(storage(["+", ["/", ["^", "q", 2], 2], ["-", 1, ["sqrt", 4.0]]]))
     assert read.fillings["a"].energy({Path.of("q"): np.array([3.0])}) == 3.5
 
@@ -354,56 +348,66 @@ def test_what_holds_beside_the_zero_of_a_sign_only_is_not_proved(edge, everywher
     """sign² is 1 but where the sign is 0; it is sign · sign there, too."""
     sign = ["sign", ["-", "x", edge]]
     nothing = ["-", ["*", sign, sign] if everywhere else 1.0, ["^", sign, 2.0]]
-    ports = {"q": {"quantity": "momentum"}, "x": {"quantity": "displacement"}}
-    pattern = {"format": 1, "junctions": ports, "boxes": {"a": {"q": "q", "x": "~x"}}}
-    read = [["q", ports["q"]], ["x", {**ports["x"], "exposed": "state"}]]
-    parts = [{"reversible": "g", "ports": read, "L": [[nothing]]}, {"pattern": pattern, "fillings": {"a": 0}}]
-    made = System.from_dict({"format": 1, "parts": parts}).fillings["a"]
+    ports = [("q", {"quantity": "momentum"}), ("x", LENGTH | {"exposed": "state"})]
+    made = System.from_dict(document(ports, reversible="g", L=[[nothing]])).fillings["a"]
     assert made.verdict == ("proved" if everywhere else "searched")
 
 
-@pytest.mark.parametrize(
-    "broken, words",
-    [
-        ([], r"document: found \[\], expected an object"),
-        ({"format": 2, "parts": []}, "format: found 2"),
-        ({"format": 1, "parts": []}, "parts: found no system"),
-        ({"format": 1, "parts": [SPRING]}, "parts: found the primitive spring, expected a system as the last part"),
-        (document(), r"parts\[0\]: found the keys none, expected one of part, storage"),
-        (document(**SPRING, storage="s"), r"parts\[0\]: found the keys parameters, part, ports, storage"),
-        (document(**SPRING, colour=1), "key colour"),
-        (document(**SPRING | {"part": "os.system"}), r"parts\[0\]\.part: found os\.system, expected the name of a"),
-        (document(**SPRING | {"part": "__class__"}), "library part"),
-        (document(**SPRING | {"parameters": {}}), r"parts\[0\]: found .*argument"),
-        (document(**SPRING | {"parameters": {"k": "stiff"}}), r"parts\[0\]: "),
-        (document(**SPRING | {"parameters": {"k": -1}}), "expected a number > 0"),
-        (document(**SPRING | {"parameters": {"k": True}}), r"parameters\.k: found True, expected a number"),
-        (document(**SPRING | {"parameters": {"k": 1e999}}), "finite"),
-        (document(**SPRING | {"ports": [["p", {"quantity": "displacement"}]]}), r"parts\[0\]\.ports: found p"),
-        (document(**SPRING | {"ports": [["q"]]}), r"ports\[0\]: found 1 entries"),
-        (document(**SPRING | {"ports": [["q", {"quantity": "luck"}]]}), r"ports\[0\]\[1\].*luck"),
-        (storage(["system", "q"]), r"parts\[0\]\.energy\[0\]: found system, expected an operation"),
-        (storage(["^", "q"]), "1 arguments of .*, expected 2"),
-        (storage(["+"]), "0 arguments"),
-        (storage(["^", "q", "r"]), r"energy\[2\]: found r, expected the name of a port of one number: q"),
-        (storage(["entry", "q", 0]), "several numbers: none"),
-        (storage([["^"], "q"]), "expected an operation"),
-        (storage(None), "found None, expected a number"),
-        (storage({"q": 1}), "expected a number"),
-        (storage("__import__('os')"), "name of a port"),
-        (storage(["log", ["-", 0, ["^", "q", 2]]]), r"parts\[0\]"),
-        (document(reversible="g", ports=PORTS, L=[[1.0]]), "not reversible"),
-        (document(reversible="g", ports=PORTS, L=[[0.0], [0.0]]), r"L: found 2 rows, expected 1"),
-        (document(reversible="g", ports=PORTS, C=[[0.0, 1.0]]), r"C\[0\]: found 2 entries, expected 1"),
-        (document(irreversible="m", ports=PORTS, M=[[1.0]]), "energy is not conserved"),
-        ({"format": 1, "parts": [{"pattern": {}, "fillings": {}}]}, r"parts\[0\]\.pattern: .*no key format"),
-        ({"format": 1, "parts": document(**SPRING)["parts"][1:]}, r"fillings\.a: found 0, expected the number"),
-        (document(part="point_mass", ports=[["p", {"quantity": "momentum"}]], parameters={"m": 1.0}), "interface"),
-    ],
+SPRING, STORED, GYRATOR, FRICTION = (
+    json.dumps(document(**part))
+    for part in (
+        {"part": "spring", "parameters": {"k": 1.0}}, {"storage": "s", "energy": "q"},
+        {"reversible": "g", "L": [[0.0]]}, {"irreversible": "m", "M": [[1.0]]},
+    )
 )  # fmt: skip
-def test_what_is_no_system_is_refused_with_its_place(broken, words):
+PORTS, ENERGY = '["q", {"quantity": "displacement"}]', '"energy": "q"'
+BROKEN = [
+    (SPRING, SPRING, "[]", r"document: found \[\], expected an object"),
+    (SPRING, '{"format": 1, "parts"', '{"format": 2, "parts"', "format: found 2"),
+    (SPRING, SPRING, '{"format": 1, "parts": []}', "parts: found no system"),
+    (
+        SPRING, SPRING[SPRING.index(', {"pattern"') :], "]}",
+        "parts: found the primitive spring, expected a system as the last part",
+    ),
+    (STORED, '"storage": "s", "energy"', '"energy"', r"parts\[0\]: found the keys energy, ports, expected one of"),
+    (SPRING, '"part"', '"storage": "s", "part"', r"parts\[0\]: found the keys parameters, part, ports, storage"),
+    (SPRING, '"part"', '"colour": 1, "part"', "key colour"),
+    (SPRING, '"spring"', '"os.system"', r"parts\[0\]\.part: found os\.system, expected the name of a"),
+    (SPRING, '"spring"', '"__class__"', "library part"),
+    (SPRING, '"k": 1.0', "", r"parts\[0\]: found .*argument"),
+    (SPRING, "1.0", '"stiff"', r"parts\[0\]: "),
+    (SPRING, "1.0", "-1", "expected a number > 0"),
+    (SPRING, "1.0", "true", r"parameters\.k: found True, expected a number"),
+    (SPRING, "1.0", "1e999", "finite"),
+    (SPRING, PORTS, '["p", {"quantity": "displacement"}]', r"parts\[0\]\.ports: found p"),
+    (SPRING, PORTS, '["q"]', r"ports\[0\]: found 1 entries"),
+    (SPRING, PORTS, '["q", {"quantity": "luck"}]', r"ports\[0\]\[1\].*luck"),
+    (STORED, ENERGY, '"energy": ["system", "q"]', r"parts\[0\]\.energy\[0\]: found system, expected an operation"),
+    (STORED, ENERGY, '"energy": ["^", "q"]', "1 arguments of .*, expected 2"),
+    (STORED, ENERGY, '"energy": ["+"]', "0 arguments"),
+    (STORED, ENERGY, '"energy": ["^", "q", "r"]', r"energy\[2\]: found r, expected .* port of one number: q"),
+    (STORED, ENERGY, '"energy": ["entry", "q", 0]', "several numbers: none"),
+    (STORED, ENERGY, '"energy": [["^"], "q"]', "expected an operation"),
+    (STORED, ENERGY, '"energy": null', "found None, expected a number"),
+    (STORED, ENERGY, '"energy": {"q": 1}', "expected a number"),
+    (STORED, ENERGY, '"energy": "__import__(\'os\')"', "name of a port"),
+    (STORED, ENERGY, '"energy": ["log", ["-", 0, ["^", "q", 2]]]', r"parts\[0\]"),
+    (GYRATOR, "0.0", "1.0", "not reversible"),
+    (GYRATOR, "0.0", "0.0], [0.0", r"L: found 2 rows, expected 1"),
+    (GYRATOR, '"L": [[0.0]]', '"C": [[0.0, 1.0]]', r"C\[0\]: found 2 entries, expected 1"),
+    (FRICTION, FRICTION, FRICTION, "energy is not conserved"),
+    (SPRING, SPRING, '{"format": 1, "parts": [{"pattern": {}, "fillings": {}}]}', r"\[0\]\.pattern: .*no key format"),
+    (SPRING, '"fillings": {"a": 0}', '"fillings": {"a": 1}', r"fillings\.a: found 1, expected the number"),
+    (SPRING, '{"quantity": "displacement"}}, "boxes"', '{"quantity": "charge"}}, "boxes"', "interface"),
+]  # fmt: skip
+"""A document, a text in it that is another one, and what is said of that."""
+
+
+@pytest.mark.parametrize(("whole", "old", "new", "words"), BROKEN)
+def test_what_is_no_system_is_refused_with_its_place(whole, old, new, words):
+    assert old in whole
     with pytest.raises(PatternError, match=words):
-        System.from_dict(broken)
+        System.from_json(whole.replace(old, new))
 
 
 def nested(depth, inner="q"):

@@ -38,7 +38,7 @@ def assert_starts(system, values):
     assert system.initial.keys() == values.keys()
     state = system.state()
     for path, value in values.items():
-        assert np.allclose(system.initial[path], value, rtol=0.0, atol=ROUNDING * largest(value))
+        assert largest(system.initial[path] - value) <= ROUNDING * largest(value)
         assert np.array_equal(state[path], system.initial[path])
 
 
@@ -99,7 +99,7 @@ def test_a_run_goes_on_from_its_end():
     whole = ephs.simulate(system, 1.0, method="rk54", step=0.01)
     half = ephs.simulate(system, 0.5, method="rk54", step=0.01)
     rest = ephs.simulate(system.at(half, 0.5), 1.0, t0=0.5, method="rk54", step=0.01)
-    assert np.allclose(rest["spring.q"], whole["spring.q"][50:], rtol=0.0, atol=8 * 400 * EPS * 2.0)
+    assert largest(rest["spring.q"] - whole["spring.q"][50:]) <= 8 * 400 * EPS * 2.0
     with pytest.raises(AssemblyError, match=r"no state at 0\.7 s; it has times from 0\.0 to 0\.5 s"):
         system.at(half, 0.7)
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.cli import main
 from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts import (
     FAMILIES,
@@ -26,6 +25,7 @@ from ephs.show.charts.reasons import letter_of, reason_of, reasons, reasons_tabl
 from ephs.show.charts.reference import PosesInTime
 from ephs.show.charts.runs import RunEnding, RunSetting, attempt
 from tests.scenes import ROOT
+from tests.typed import typed
 
 TOP = ROOT / "scenes/heavy-top.toml"
 T = np.linspace(0.0, 10.0, 101)
@@ -225,9 +225,9 @@ def test_letters_of_reasons_are_different():
 
 
 def test_the_commands_write_their_folders(tmp_path, capsys):
-    words = ["chart", "work-precision", str(TOP), "--until", "0.01", "--method", "rk87", "-o", str(tmp_path)]
-    assert main(words) == 0
-    assert main(["chart", "stability", "half-turn", "--quick", "-o", str(tmp_path)]) == 0
+    words = f"chart work-precision {TOP} --until 0.01 --method rk87 -o {tmp_path}"
+    assert typed(words) == 0
+    assert typed(f"chart stability half-turn --quick -o {tmp_path}") == 0
     said = capsys.readouterr().out
     for name in ("work-precision-heavy-top", "stability-half-turn"):
         for ending in ("png", "svg"):
@@ -241,22 +241,22 @@ def test_the_commands_write_their_folders(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["work-precision", str(TOP), "--method", "euler"], "natural"),
-        (["work-precision", "nowhere.toml"], "no such file"),
-        (["work-precision"], "found no scene"),
-        (["work-precision", str(TOP), "--until", "-1"], "--until"),
-        (["work-precision", str(TOP), "--reference", str(TOP)], "no reference states"),
-        (["work-precision", str(TOP), "--reference", "nowhere.json"], "nowhere.json"),
-        (["work-precision", str(TOP), "--reference", "benchmarks/reference/tumbling-body.json"], "tumbling-body"),
-        (["work-precision", f"{ROOT / 'examples/oscillator.py'}:free_oscillator"], "expected a Scene"),
-        (["stability", "nothing"], "half-turn"),
-        (["stability", "nowhere.toml"], "no such file"),
-        (["stability", "half-turn", "--until", "nan"], "--until"),
+        (f"work-precision {TOP} --method euler", "natural"),
+        ("work-precision nowhere.toml", "no such file"),
+        ("work-precision", "found no scene"),
+        (f"work-precision {TOP} --until -1", "--until"),
+        (f"work-precision {TOP} --reference {TOP}", "no reference states"),
+        (f"work-precision {TOP} --reference nowhere.json", "nowhere.json"),
+        (f"work-precision {TOP} --reference benchmarks/reference/tumbling-body.json", "tumbling-body"),
+        (f"work-precision {ROOT}/examples/oscillator.py:free_oscillator", "expected a Scene"),
+        ("stability nothing", "half-turn"),
+        ("stability nowhere.toml", "no such file"),
+        ("stability half-turn --until nan", "--until"),
     ],
 )
 def test_bad_names_are_one_message(words, said, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
-    assert main(["chart", *words, "-o", str(tmp_path)]) == 2
+    assert typed(f"chart {words} -o {tmp_path}") == 2
     error = capsys.readouterr().err
     assert said in error
     assert "Traceback" not in error

@@ -12,7 +12,7 @@ from ephs import library as lib
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.semantics.descriptor.product import factors_of
 from tests.mechanics.drawn_scenes import drawn, toml
-from tests.numerics import EPS
+from tests.numerics import EPS, largest
 from tests.semantics.test_product import coils, walls
 from tests.written import scene_of_text
 
@@ -74,7 +74,7 @@ def apart(one, other):
     pairs += [(getattr(one, name), getattr(other, name)) for name in ("energy", "exergy", "entropy", "heat", "work")]
     books = ((one.ledgers.storages, other.ledgers.storages), (one.ledgers.makers, other.ledgers.makers))
     pairs += [(book[path], its[path]) for book, its in books for path in book]
-    return max(np.abs(x - y).max(initial=0.0) / (1.0 + np.abs(y).max(initial=0.0)) for x, y in pairs)
+    return max(largest(x - y, initial=0.0) / (1.0 + largest(y, initial=0.0)) for x, y in pairs)
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -95,7 +95,7 @@ def test_parts_far_from_metres_and_seconds_are_those_of_the_whole(scale):
     one = ephs.simulate(model, times[-1], save_at=times, events=[lambda t, state: 1.0], **options)
     assert parts.stats["independent_parts"] == 2 and np.array_equal(parts.t, one.t)
     for path, values in one.states.items():
-        assert np.allclose(parts[path], values, rtol=SAME, atol=SAME * np.abs(values).max(initial=0.0))
+        assert np.allclose(parts[path], values, rtol=SAME, atol=SAME * largest(values, initial=0.0))
 
 
 def test_parts_run_backward_to_where_they_came_from():
@@ -106,8 +106,8 @@ def test_parts_run_backward_to_where_they_came_from():
     assert back.stats["independent_parts"] == 2
     start = tops.system().state()
     for path in back.states:
-        assert np.allclose(back[path][0], there[path][0], rtol=0.0, atol=SAME)
-        assert np.allclose(back[path][1], start[path], rtol=0.0, atol=SAME)
+        assert largest(back[path][0] - there[path][0]) <= SAME
+        assert largest(back[path][1] - start[path]) <= SAME
 
 
 def test_a_run_of_the_whole_has_the_states_and_ledgers_of_runs_of_its_parts_to_the_bit():
@@ -151,7 +151,7 @@ def test_each_part_takes_the_steps_that_it_needs():
     found, one = ephs.simulate(rings(), TIMES[-1], **(TIGHT | RINGING)), whole(rings(), **RINGING)
     exact = np.exp(-np.outer(TIMES, RATES))
     for sol in (found, one):
-        assert max(np.abs(sol[f"coil{i}.b"] - exact[:, i]).max() for i in range(10)) < 1e-5
+        assert max(largest(sol[f"coil{i}.b"] - exact[:, i]) for i in range(10)) < 1e-5
     assert found.stats["independent_parts"] == 10 and found.stats["steps"] < 5 * one.stats["steps"]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.runs import journaling
@@ -100,10 +100,7 @@ FUNCTIONS: dict[str, Callable[[float], Any]] = {
 
 def unrecorded(size):
     """An oscillator whose energy cannot be recorded, with a number of its own."""
-    parts = Pattern(
-        {"q": junction(Q.displacement), "p": junction(Q.momentum)},
-        {"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
-    )
+    parts = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")
     spring = ephs.storage({"q": Q.displacement}, lambda q: 0.5 * size * float(q) ** 2, initial={"q": 1.0})
     return parts(pe=spring, ke=lib.point_mass(m=1.0), pkc=lib.pkc())
 

@@ -63,7 +63,7 @@ def test_a_step_back_undoes_a_step():
     x0 = descriptor.pack(system.state({"pe.q": 1.0, "ke.p": 0.3}))
     there = method.step(method.init(x0), 0.1)
     back = method.step(method.init(there.x), -0.1)
-    assert np.allclose(back.x, x0, rtol=0.0, atol=1e-13)
+    assert largest(back.x - x0) <= 1e-13
 
 
 def test_dense_output_meets_the_times_asked_for(damped):
@@ -96,7 +96,7 @@ def test_a_force_works_and_its_work_is_in_the_balance(driven, force):
     sol = ephs.simulate(driven, 2.0, step=0.01, inputs={"p": {"flow": force}})
     exact = 0.7 / 1.5 * (1.0 - np.cos(np.sqrt(1.5) * sol.t))
     assert largest(sol["pe.q"] - exact) < 1e-4
-    assert np.allclose(sol.work, 0.7 * sol["pe.q"], rtol=0.0, atol=1e-13)
+    assert largest(sol.work - 0.7 * sol["pe.q"]) <= 1e-13
     assert sol.energy_error.max() < 1e-13
 
 
@@ -116,8 +116,8 @@ def test_inputs_of_time_enter_at_order_two(driven):
 
 def test_a_prescribed_effort_holds_and_its_work_is_in_the_balance(driven):
     sol = ephs.simulate(driven, 1.0, step=0.01, initial={"ke.p": 0.5}, inputs={"p": {"effort": 0.5}})
-    assert np.allclose(sol["pe.q"], 0.5 * sol.t, rtol=0.0, atol=1e-13)
-    assert np.allclose(sol.work, 0.75 * sol["pe.q"] ** 2, rtol=0.0, atol=1e-13)
+    assert largest(sol["pe.q"] - 0.5 * sol.t) <= 1e-13
+    assert largest(sol.work - 0.75 * sol["pe.q"] ** 2) <= 1e-13
 
 
 def test_progress_is_told_and_the_times_ascend(damped):

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ephs
-from ephs import Pattern, junction, library
+from ephs import Pattern, library
 from ephs import quantity as Q
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.system_problem import problem_of_system
@@ -23,13 +23,10 @@ SYSTEMS = [method.name for method in METHODS.values() if method.systems]
 
 def walls(*parts):
     """Two bodies of 300 K with these between them."""
-    names = [f"wall{i}" for i in range(len(parts))]
-    pattern = Pattern(
-        {"a": junction(Q.entropy), "b": junction(Q.entropy)},
-        {"hot": {"s": "a"}, "cold": {"s": "b"}} | {name: {"a": "a", "b": "b"} for name in names},
-    )
+    between = {f"wall{i}": part for i, part in enumerate(parts)}
+    text = "a: entropy; b: entropy; hot(s=a); cold(s=b);" + "".join(f"{name}(a, b);" for name in between)
     body = library.thermal_capacity(c1=300.0, c2=1.0)
-    return pattern(hot=body, cold=body, **dict(zip(names, parts, strict=True)))
+    return Pattern.from_text(text)(hot=body, cold=body, **between)
 
 
 SEEN, HIDDEN = conduct(lambda a, b: 2.0)(), conduct(hidden(lambda a, b: 2.0))()
@@ -100,9 +97,8 @@ def test_domains_are_bounds_of_ports():
 
 def heated(conduction):
     """A body with a resistor on it, and one with which it exchanges heat."""
-    pattern = Pattern(
-        {"b": junction(Q.flux_linkage, exposed=True), "a": junction(Q.entropy), "s": junction(Q.entropy)},
-        {"coil": {"b": "b", "s": "s"}, "other": {"s": "a"}, "body": {"s": "s"}, "wall": {"a": "a", "b": "s"}},
+    pattern = Pattern.from_text(
+        "b: flux_linkage, exposed; a: entropy; s: entropy; coil(b, s); other(s=a); body(s); wall(a, b=s)"
     )
     bodies = {name: library.thermal_capacity(c1=300.0 * c, c2=c) for name, c in (("other", 60.0), ("body", 20.0))}
     return pattern(coil=library.resistor(r=100.0), wall=conduction, **bodies)

@@ -9,7 +9,7 @@ from scipy.sparse import csc_array
 from ephs.solve.methods import solvers
 from ephs.solve.methods.solvers import DENSE, NARROW, Solvers
 from ephs.solve.posing.errors import SolveError
-from tests.numerics import EPS, generators, seeds
+from tests.numerics import EPS, generators
 
 
 def made():
@@ -21,7 +21,7 @@ def matrices(draw):
     """Diagonally dominant matrices of some diagonals in a hidden order, real or complex; and how many there are."""
     n = draw(st.integers(1, 3 * DENSE))
     below, above = (draw(st.integers(0, min(n - 1, NARROW))) for _ in range(2))
-    rng = np.random.default_rng(draw(seeds))
+    rng = draw(generators)
     i, j = np.indices((n, n))
     dense = np.where((i - j <= below) & (j - i <= above), rng.uniform(-1.0, 1.0, (n, n)), 0.0)
     dense = dense + np.diag(np.full(n, 2.0 + below + above))

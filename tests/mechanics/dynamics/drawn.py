@@ -12,7 +12,7 @@ from ephs import PolynomialMotion
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import frozen
 from ephs.testing import mechanisms
-from tests.numerics import seeds
+from tests.numerics import generators
 
 SHARED = ephs.dynamics(families.scene("planar-chain", 1))
 """Compiles what all mechanisms share, before draws are timed."""
@@ -40,7 +40,7 @@ def turned(joint):
 def moving(draw, **options):
     """(scene, its dynamics, a state in motion, generator): some joints turned, some driven, some prescribed."""
     scene = draw(mechanisms(**({"max_bodies": 4} | options)))
-    rng = np.random.default_rng(draw(seeds))
+    rng = draw(generators)
     joints = {}
     tree = len(scene.joints) == len(scene.bodies)
     for name, joint in scene.joints.items():

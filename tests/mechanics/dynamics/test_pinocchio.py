@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.pinocchio_models import KINDS, PinModel
-from tests.numerics import largest, seeds
+from tests.numerics import generators, largest
 
 ALIKE = 1e-11
 
@@ -22,7 +22,7 @@ def trees(draw, kinds):
     assume(dynamics.layout.n > 0)
     state, other = dynamics.state0, PinModel(scene, dynamics)
     q, v = other.configuration(dynamics, state), other.vector(flat(dynamics, state.rates))
-    return dynamics, other, state, q, v, np.random.default_rng(draw(seeds))
+    return dynamics, other, state, q, v, draw(generators)
 
 
 def alike(found, expected, scale=1.0):

@@ -15,7 +15,7 @@ from ephs.testing import check_primitive
 from tests.mechanics.elements.test_beam import flight_is_lawful
 from tests.mechanics.linear.test_beam_statics import HEAD, along
 from tests.methods import OF_SCENES
-from tests.numerics import largest
+from tests.numerics import largest, slope
 from tests.written import scene_of_text
 
 KIRCHHOFF = "{ GJ = 0.8, EI = [1.0, 2.0], rhoA = 1.0, rhoI = [2e-4, 1e-4, 1e-4] }"
@@ -175,9 +175,8 @@ def test_the_damping_of_a_hinge_resists_the_rate_of_its_rotation_vector():
     """By its structure, and as differences of rotation vectors say."""
     d, turn = np.diag([0.8, 1.0, 2.0]), np.array([0.4, -0.9, 0.5])
     check_primitive(hinge_damper(d), max_examples=20)
-    q, u, step = SO3.exp(turn), np.array([0.3, 0.2, -0.7]), 1e-5
-    ahead, behind = (SO3.log(SO3.compose(q, SO3.exp(sign * step * u))) for sign in (1.0, -1.0))
-    rate = (ahead - behind) / (2.0 * step)
+    q, u = SO3.exp(turn), np.array([0.3, 0.2, -0.7])
+    rate = slope(lambda t: SO3.log(SO3.compose(q, SO3.exp(t * u))), 1e-5)
     power = u @ np.array(turning_resistance(q, d)) @ u
     assert power == pytest.approx(rate @ d @ rate, rel=1e-8)
     assert abs(u @ d @ u - power) > 1e-2 * power

@@ -15,6 +15,7 @@ from ephs.operad import Path
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from tests.mechanics.touching_scenes import CORNERS, least_gap
+from tests.numerics import largest
 from tests.written import scene_of_text
 
 DRAWN = {
@@ -118,7 +119,7 @@ def scene_of(seed, pair, *, hard, before):
 
 def lawful(sol):
     """Both laws, in every step."""
-    assert np.abs(sol.energy_error).max() <= 1e-11
+    assert largest(sol.energy_error) <= 1e-11
     assert sol.stats["least_production"] >= 0.0
     assert np.all(np.diff(sol.heat) >= 0.0)
 
@@ -138,7 +139,7 @@ def carried(scene, state):
 def change(scene, before, after):
     """Of the momenta, relative to the sum of sizes."""
     (first, size), (last, _) = carried(scene, before), carried(scene, after)
-    return np.abs(last - first).max() / size
+    return largest(last - first) / size
 
 
 def blow(scene):
@@ -168,7 +169,7 @@ def push(scene):
     assert corrected <= 1e-11
     assert change(scene, first, last) <= ROUNDING + corrected
     path = Path.of("bodies.b.ke.p")
-    return np.abs(last[path] - first[path]).max() / np.abs(first[path]).max()
+    return largest(last[path] - first[path]) / largest(first[path])
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)

@@ -18,7 +18,7 @@ from ephs.semantics.spaces import SE3
 from ephs.solve.posing.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
-from tests.numerics import EPS, generators
+from tests.numerics import EPS, generators, largest
 from tests.scenes import equations_of
 from tests.written import scene_of_text
 
@@ -118,8 +118,8 @@ def test_a_mass_on_a_tendon_over_two_points_swings_as_a_cosine(method, options, 
     sol = ephs.simulate(scene, 1.0, method=method, save_at=[0.0, 0.5, 1.0], audit="off", **options)
     rest = np.sqrt(10.0) + 2.0 - 4.5 - MASS * FALL / STIFFNESS  # where weight and tension balance
     exact = rest * (1.0 - np.cos(np.sqrt(STIFFNESS / MASS) * sol.t))
-    assert np.allclose(sol.joint("rail").coordinate[:, 0], exact, rtol=0.0, atol=near)
-    assert np.allclose(sol["tendons.rope.spring.q"].ravel(), 2.0 - exact, rtol=0.0, atol=near)
+    assert largest(sol.joint("rail").coordinate[:, 0] - exact) <= near
+    assert largest(sol["tendons.rope.spring.q"].ravel() - (2.0 - exact)) <= near
 
 
 def swinging(t, y):
@@ -139,7 +139,7 @@ def test_a_bob_across_a_damped_tendon_moves_as_equations_by_hand_say(method, opt
     z, v, heat = solve_ivp(swinging, (0.0, 1.0), [0.3, 1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     rail = sol.joint("rail")
     found = [rail.coordinate[-1, 0], rail.rate[-1, 0], sol.heat[-1]]
-    assert np.allclose(found, [z, v, heat], rtol=0.0, atol=10.0 * near)
+    assert largest(found - [z, v, heat]) <= 10.0 * near
     assert np.all(np.diff(sol.heat) >= 0.0)
     assert sol.energy_error.max() < 1e-10
 
@@ -152,7 +152,7 @@ def test_a_cable_only_pulls():
     for method, options in (("rk87", {"rtol": 1e-10}), ("natural", {"step": 1e-3}), ("radau", {"rtol": 1e-9})):
         sol = ephs.simulate(scene, float(times[-1]), method=method, save_at=times, audit="off", **options)
         z = sol.joint("rail").coordinate[:, 0]
-        assert np.allclose(z[:3], 4.0 * times[:3] - 0.5 * FALL * times[:3] ** 2, rtol=0.0, atol=1e-6)
+        assert largest(z[:3] - (4.0 * times[:3] - 0.5 * FALL * times[:3] ** 2)) <= 1e-6
         rate, beat = 4.0 - FALL * taut, np.sqrt(STIFFNESS / MASS)
         drop = MASS * FALL / STIFFNESS
         exact = 0.5 - drop + drop * np.cos(0.2 * beat) + rate / beat * np.sin(0.2 * beat)

@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.cli import main
 from tests.mechanics.imports.models import MODELS, URDF
 from tests.refused import corpus
+from tests.typed import typed
 
 LAUGHS = """<?xml version="1.0"?>
 <!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;"><!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;">]>
@@ -45,7 +45,7 @@ def test_what_is_wrong_is_said_in_these_lines(ending, text, told, write, capsys)
         ephs.load(path)
     assert [str(fault) for fault in caught.value.faults] == told
     assert caught.value.path == str(path)
-    assert main(["check", str(path)]) == 2
+    assert typed(f"check {path}") == 2
     said = capsys.readouterr().err
     assert said.startswith(str(path))
     assert "Traceback" not in said
@@ -140,7 +140,7 @@ def test_without_mujoco_there_is_one_clear_error(write, monkeypatch, capsys):
     path = write(MODELS["xml"], "xml")
     with pytest.raises(ephs.SceneError, match=r"pip install 'ephs\[models\]'"):
         ephs.load(path)
-    assert main(["check", str(path)]) == 2
+    assert typed(f"check {path}") == 2
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ephs.ModelWarning)
         assert ephs.load(write(URDF)).name == "arm"  # which needs none

@@ -7,6 +7,7 @@ import ephs
 from ephs.mechanics.imports.draft import pose
 from ephs.mechanics.imports.read import read_model
 from ephs.semantics.spaces import SE3
+from tests.numerics import largest
 
 MASS = "<inertial><mass>{}</mass><inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.25</izz></inertia></inertial>"
 LINK = '<link name="{}">{}' + MASS + "</link>"
@@ -42,7 +43,7 @@ def test_models_within_models_are_the_flat_model(write, quiet):
     place, inner, tip = (pose_of(PLACES[key]) for key in ("place", "inner", "tip"))
     hand = SE3.compose(place, SE3.compose(inner, tip))
     assert set(nested.bodies) == {"upper", "wrist::hand"}
-    assert np.abs(nested.body("wrist::hand").pose - hand).max() < 1e-15 * 8
+    assert largest(nested.body("wrist::hand").pose - hand) < 1e-15 * 8
     text = (
         '<model name="m"><pose>{place}</pose><frame name="wrist"><pose>{inner}</pose></frame>'.format(**PLACES)
         + LINK.format("upper", "", 2)
@@ -57,7 +58,7 @@ def test_models_within_models_are_the_flat_model(write, quiet):
         np.array([ephs.dynamics(s).acceleration(ephs.dynamics(s).state(*turned))[j][0] for j in ("shoulder", "elbow")])
         for s in (nested, flat)
     )
-    assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
+    assert largest(found - expected) < 1e-13 * largest(expected)
 
 
 def test_several_models_of_a_world_move_as_each_alone(write, quiet):

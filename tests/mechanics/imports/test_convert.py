@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.cli import main
 from ephs.mechanics.imports import convert
 from ephs.mechanics.imports.convert import toml_text
 from ephs.mechanics.scene.document import scene_to_text
 from tests.mechanics.imports.models import URDF
+from tests.typed import typed
 
 GYMNASIUM = Path(find_spec("gymnasium").submodule_search_locations[0]) / "envs/mujoco/assets"
 pytestmark = pytest.mark.filterwarnings("ignore::ephs.ModelWarning", "ignore::ephs.SceneWarning")
@@ -48,8 +48,8 @@ def test_meshes_are_found_from_another_folder(write, tmp_path):
     (tmp_path / "meshes/part.stl").write_text(MESH)
     visual = '<visual><geometry><mesh filename="package://robot/meshes/part.stl" scale="2 2 2"/></geometry></visual>'
     model = write(f'<robot name="r"><link name="a">{visual}</link></robot>')
-    assert main(["convert", str(model), "-o", str(tmp_path / "far/away.toml")]) == 0
-    assert main(["convert", str(model), "-o", str(tmp_path / "beside.toml")]) == 0
+    assert typed(f"convert {model} -o {tmp_path / 'far/away.toml'}") == 0
+    assert typed(f"convert {model} -o {tmp_path / 'beside.toml'}") == 0
     for scene, place in (
         (ephs.load(model), "meshes/part.stl"),
         (ephs.load(tmp_path / "beside.toml"), "meshes/part.stl"),
@@ -62,13 +62,13 @@ def test_meshes_are_found_from_another_folder(write, tmp_path):
 
 def test_the_command_says_what_is_left_out_once(write, tmp_path, capsys):
     model = write(URDF)
-    assert main(["convert", str(model), "-o", str(tmp_path / "arm.toml"), "--base", "free"]) == 0
+    assert typed(f"convert {model} -o {tmp_path / 'arm.toml'} --base free") == 0
     done = capsys.readouterr()
     assert done.out.strip() == str(tmp_path / "arm.toml")
     assert done.err.count("limits of: shoulder, rail") == 1
-    assert main(["reduce", str(tmp_path / "arm.toml")]) == 0
+    assert typed(f"reduce {tmp_path / 'arm.toml'}") == 0
     assert capsys.readouterr().err == ""
-    assert main(["reduce", str(model)]) == 0
+    assert typed(f"reduce {model}") == 0
     assert capsys.readouterr().err.count("limits of: shoulder, rail") == 1
 
 
@@ -107,4 +107,4 @@ def test_a_robot_that_falls_freely_from_rest_runs(name):
 @pytest.mark.parametrize("name", ["swimmer", "inverted_pendulum", "hopper"])
 def test_a_robot_at_rest_passes_its_check(name, capsys):
     """Where nothing moves, and all energies are zero but for rounding, no law fails for that."""
-    assert main(["check", str(GYMNASIUM / f"{name}.xml")]) == 0
+    assert typed(f"check {GYMNASIUM / f'{name}.xml'}") == 0

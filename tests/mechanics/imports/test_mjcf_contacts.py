@@ -17,6 +17,7 @@ from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
 from tests.mechanics.imports.by_mujoco import compiled, forward
 from tests.mechanics.shapes.test_meshes import prism
+from tests.numerics import generators
 
 SINGLE = 1e-6
 """MuJoCo keeps meshes in single precision, and its general distances have this tolerance."""
@@ -114,7 +115,7 @@ def distance(scene, first, second):
 @given(data=st.data())
 def test_distances_are_those_of_mujoco(kind, data, tmp_path_factory):
     """A ball and a plane meet each shape at MuJoCo's distance: no edge is rounded there."""
-    rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+    rng = data.draw(generators)
     points = " ".join(map(repr, rng.uniform(-0.5, 0.5, 36).tolist()))
     quat = rng.normal(size=4)
     place = rng.uniform(-0.3, 0.3, 3).tolist(), (quat / np.linalg.norm(quat)).tolist()

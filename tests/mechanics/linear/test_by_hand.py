@@ -5,11 +5,10 @@ import pytest
 from hypothesis import given, settings
 
 import ephs
-from ephs import Pattern, junction, quantity
+from ephs import Pattern, quantity
 from ephs.mechanics import rigid_body
 from ephs.mechanics.elements import components
 from ephs.mechanics.scene.build import scene_inputs
-from ephs.semantics.spaces import SE3
 from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.methods.test_by_hand import four_bar
 from tests.numerics import EPS, largest
@@ -76,17 +75,14 @@ def test_a_voltage_drives_the_current_that_it_sees():
 
 
 def test_what_has_no_place_in_joint_coordinates_is_refused_where_joints_could_open():
-    momentum = quantity.body_momentum
-    boxes = {"rod": {"p": "p"}, "rope": {"p": "p", "x": "x"}, "mass": {"p": "x"}}
-    rope = ephs.transformer({"p": momentum, "x": quantity.momentum}, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
+    text = "p: body_momentum; x: momentum; rod(p); rope(p, x); mass(p=x);"
+    rope = ephs.transformer({"p": quantity.body_momentum, "x": quantity.momentum}, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
     parts = {"rod": rigid_body(1.0, [1, 1, 1]), "rope": rope, "mass": ephs.library.point_mass(m=1.0)}
-    junctions = {"p": junction(momentum), "x": junction(quantity.momentum)}
-    loose = Pattern(junctions=junctions, boxes=boxes)(**parts)
+    loose = Pattern.from_text(text)(**parts)
     assert len(ephs.linearize(loose).states) == 12  # a free body: poses are independent
-    held = Pattern(
-        junctions=junctions | {"ground": junction(momentum)},
-        boxes=boxes | {"earth": {"p": "ground"}, "pin": {"p1": "ground", "p2": "p"}},
-    )(**parts, earth=components.ground(), pin=ephs.mechanics.joint("revolute", SE3.identity(), SE3.identity()))
+    held = Pattern.from_text(text + "ground: body_momentum; earth(p=ground); pin(p1=ground, p2=p)")(
+        **parts, earth=components.ground(), pin=ephs.mechanics.joint("revolute")
+    )
     with pytest.raises(ephs.OptionError, match=r"form='paper'"):
         ephs.linearize(held)
     assert len(ephs.linearize(held, form="paper").states) > 2

@@ -1,6 +1,5 @@
 """Systems that are rewritten, and what a rewrite keeps."""
 
-import numpy as np
 from hypothesis import strategies as st
 
 import ephs
@@ -8,7 +7,7 @@ from ephs import Pattern, junction, library, quantity
 from ephs.mechanics.elements import components
 from ephs.mechanics.rewrite.rewrite import sites_of
 from ephs.semantics.systems.laws import random_probe
-from tests.numerics import seeds
+from tests.numerics import generators
 
 __all__ = ["in_order", "lever_networks", "levers", "same_relation"]
 
@@ -37,7 +36,7 @@ def in_order(system, rules, rng):
 @st.composite
 def lever_networks(draw, loops=False):
     """Levers and friction between junctions, some of which store momentum or are outer ports, one may stand still."""
-    rng = np.random.default_rng(draw(seeds))
+    rng = draw(generators)
     count = draw(st.integers(2, 6))
     roles = [draw(st.sampled_from(["plain", "plain", "stored", "open"])) for _ in range(count)]
     junctions = {f"j{i}": junction(quantity.momentum, exposed=role == "open") for i, role in enumerate(roles)}

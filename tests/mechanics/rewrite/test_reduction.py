@@ -7,7 +7,6 @@ from hypothesis import assume, given, settings
 import ephs
 from benchmarks.cases import CASES
 from ephs import library
-from ephs.cli import main
 from ephs.mechanics.rewrite import coordinates
 from ephs.mechanics.rewrite.rewrite import Strength
 from ephs.mechanics.runs.scene_problem import problem_of_scene
@@ -19,6 +18,7 @@ from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
 from tests.numerics import generators, largest
 from tests.scenes import SCENES, model_of, of_all_scenes, shipped
+from tests.typed import typed
 from tests.written import scene_of_text
 
 BY_NAME = {case.name: case for case in CASES}
@@ -326,9 +326,9 @@ def _levers():
 
 
 def test_the_command_prints_the_table(capsys):
-    assert main(["reduce", str(SCENES[0].parent / "four-bar.toml")]) == 0
+    assert typed(f"reduce {SCENES[0].parent / 'four-bar.toml'}") == 0
     out = capsys.readouterr().out
     assert "224 unknowns" in out
     assert "joints.main.o1" in out
     assert "knee imposes 2 in place of 5" in out
-    assert main(["reduce", "nothing.toml"]) == 2
+    assert typed("reduce nothing.toml") == 2

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Path, Pattern, junction, library, quantity
+from ephs import Path, Pattern, library, quantity
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements.components import ground, thermal_node
 from ephs.mechanics.rewrite.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP_JOINT, DROP_POSE
@@ -56,29 +56,23 @@ def body(inertia=BRICK, gravity=(0.0, 0.0, -9.81), **group):
 
 def alone(inertia):
     """A body whose velocity is taken in world axes, with nothing outside."""
-    pattern = Pattern(junctions={"p": junction(quantity.direct_momentum)}, boxes={"body": {"p": "p"}})
-    return pattern(body=body(inertia, group="SO3xR3"))
+    return Pattern.from_text("p: direct_momentum; body(p)")(body=body(inertia, group="SO3xR3"))
 
 
 def row(first, rng, kind, inertia):
     """Bodies after a first part, each on the one before by a joint of its own frames."""
-    junctions = {f"p{i}": junction(quantity.body_momentum) for i in range(4)}
-    boxes = {f"b{i}": {"p": f"p{i}"} for i in range(4)} | {
-        f"w{i}": {"p1": f"p{i}", "p2": f"p{i + 1}"} for i in range(3)
-    }
+    text = "".join(f"p{i}: body_momentum; b{i}(p=p{i});" for i in range(4))
+    text += "".join(f"w{i}(p1=p{i}, p2=p{i + 1});" for i in range(3))
     parts = {"b0": first} | {f"b{i}": rigid_body(1.0 + i, inertia) for i in (1, 2, 3)}
     parts |= {f"w{i}": joint(kind, SE3.random(rng), SE3.random(rng)) for i in range(3)}
-    return Pattern(junctions=junctions, boxes=boxes)(parts)
+    return Pattern.from_text(text)(parts)
 
 
 def two(link, gravity=WEIGHT, *, turned=False):
     """Two bodies, of which the second one is at the joint's first frame where they are turned."""
-    ends = {"p1": "p2", "p2": "p1"} if turned else {"p1": "p1", "p2": "p2"}
-    pattern = Pattern(
-        junctions={name: junction(quantity.body_momentum) for name in ("p1", "p2")},
-        boxes={"body1": {"p": "p1"}, "body2": {"p": "p2"}, "joint": ends},
-    )
-    return pattern(joint=link, **{f"body{i}": rigid_body(float(i), BRICK, gravity) for i in (1, 2)})
+    ends = "p1=p2, p2=p1" if turned else "p1, p2"
+    text = f"p1: body_momentum; p2: body_momentum; body1(p=p1); body2(p=p2); joint({ends})"
+    return Pattern.from_text(text)(joint=link, **{f"body{i}": rigid_body(float(i), BRICK, gravity) for i in (1, 2)})
 
 
 def found_again(done, start, near=1e-12):
@@ -259,11 +253,11 @@ def test_what_would_change_the_meaning_is_refused(rule, system, words):
 def test_rules_wait_for_a_weld_of_their_own_body():
     """Of two weightless pairs, joined rigidly and by a hinge."""
     pairs = {"left": "fixed", "right": "revolute"}
-    junctions = {f"{name}{i}": junction(quantity.body_momentum) for name in pairs for i in (1, 2)}
-    boxes = {f"body_{at}": {"p": at} for at in junctions}
-    parts = {box: body(gravity=NONE) for box in boxes} | {name: joint(kind) for name, kind in pairs.items()}
-    boxes |= {name: {"p1": f"{name}1", "p2": f"{name}2"} for name in pairs}
-    system = rewrite(Pattern(junctions=junctions, boxes=boxes)(parts), (FOLD, DROP_FRICTION)).system
+    ends = [f"{name}{i}" for name in pairs for i in (1, 2)]
+    text = "".join(f"{end}: body_momentum; body_{end}(p={end});" for end in ends)
+    text += "".join(f"{name}(p1={name}1, p2={name}2);" for name in pairs)
+    parts = {f"body_{end}": body(gravity=NONE) for end in ends} | {name: joint(kind) for name, kind in pairs.items()}
+    system = rewrite(Pattern.from_text(text)(parts), (FOLD, DROP_FRICTION)).system
     for rule in (DROP_GYROSCOPIC, DROP_POSE):
         found = {str(site.where).split(".")[0]: site.refusal for site in sites_of(system, rule)}
         assert len(found) == 4

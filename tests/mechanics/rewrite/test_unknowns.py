@@ -1,12 +1,10 @@
 """The first count of unknowns is that of the compiled model, also where something is prescribed."""
 
-from pathlib import Path
-
 import pytest
 
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from tests.scenes import equations_of, model_of
+from tests.scenes import equations_of, model_of, of_all_scenes
 from tests.written import scene_of_text
 
 SCENE = """format = 1
@@ -35,9 +33,7 @@ def test_the_first_step_begins_with_all_unknowns(motion):
     assert bool(motion) == bool(problem.prescribed)
 
 
-@pytest.mark.parametrize(
-    "file", sorted((Path(__file__).parents[3] / "scenes").glob("*.toml")), ids=lambda file: file.stem
-)
+@of_all_scenes
 def test_the_last_step_ends_with_the_unknowns_of_a_run(file):
     scene = ephs.load(file)
     equations = equations_of(scene)

@@ -28,9 +28,10 @@ from ephs.mechanics.scene.state import lost_states
 from ephs.show.motions.lines import lines_of
 from ephs.solve.equations.mobility import Mobility
 from tests.mechanics.own_elements import Pump, Push
+from tests.scenes import ROOT
 from tests.solve.dense import dense_mobility
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "elements.md"
+PAGE = ROOT / "docs" / "elements.md"
 CELLS = re.findall(r"```\{code-cell\} ipython3\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 FALL = "format = 1\n[world]\ngravity = [0.0, 0.0, -9.81]\n[bodies.ball]\nmass = 2.0\ninertia = [0.1, 0.1, 0.1]\n"
 GOOD = {"body": "ball", "coefficient": 0.5, "slow": 0.01, "heat": "box"}

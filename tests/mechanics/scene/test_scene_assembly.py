@@ -10,7 +10,7 @@ from ephs.mechanics.scene import SceneError
 from ephs.mechanics.scene.geometry import coupling, coupling_of, joint_types
 from ephs.mechanics.scene.load import load
 from ephs.semantics.spaces import SE3
-from tests.numerics import largest, seeds
+from tests.numerics import generators, largest, seeds
 from tests.scenes import ROOT
 from tests.written import scene_of_text
 
@@ -71,19 +71,18 @@ def residuals(scene):
     return np.array(found).reshape(-1, 2).max(axis=0, initial=0.0)
 
 
-@given(seeds, st.lists(st.sampled_from(joint_types()), min_size=1, max_size=6))
-def test_joints_place_and_move_bodies(seed, kinds):
-    text = random_chain(np.random.default_rng(seed), kinds)
+@given(generators, st.lists(st.sampled_from(joint_types()), min_size=1, max_size=6))
+def test_joints_place_and_move_bodies(rng, kinds):
+    text = random_chain(rng, kinds)
     scene = scene_of_text(text)
     gap, slip = residuals(scene)
     assert gap < 1e-12
     assert slip < 1e-12
 
 
-@given(seeds, st.lists(st.sampled_from(joint_types()), min_size=1, max_size=5))
-def test_states_by_joints(seed, kinds):
+@given(generators, st.lists(st.sampled_from(joint_types()), min_size=1, max_size=5))
+def test_states_by_joints(rng, kinds):
     """with_state reaches what it is asked for, leaves the rest alone, and its inverse is itself."""
-    rng = np.random.default_rng(seed)
     scene = scene_of_text(random_chain(rng, kinds))
     names = [name for name, _ in scene.all_joints()]
     chosen = [name for name in names if rng.random() < 0.6]
@@ -103,18 +102,17 @@ def test_states_by_joints(seed, kinds):
         {n: scene.joint(n).rate for n in chosen},
     )
     for name, body in scene.all_bodies():
-        assert np.abs(SE3.increment(body.pose, back.body(name).pose)).max() < 1e-11
+        assert largest(SE3.increment(body.pose, back.body(name).pose)) < 1e-11
         np.testing.assert_allclose(back.body(name).twist, body.twist, atol=1e-10)
 
 
-@given(seeds, st.sampled_from(joint_types()), st.floats(-3.0, 3.0))
-def test_elements_are_found_again(seed, kind, scale):
-    rng = np.random.default_rng(seed)
+@given(generators, st.sampled_from(joint_types()), st.floats(-3.0, 3.0))
+def test_elements_are_found_again(rng, kind, scale):
     middle = SE3.exp(np.array([1.3, 0.4, 0.0, 0.0, 0.0, 0.0]))
     allowed = coupling(kind, 0.3, middle if kind == "universal" else None)
     x = allowed.element(rng.uniform(-1.0, 1.0, allowed.dim) * abs(scale))
     pose = allowed.include(x)
-    assert np.abs(SE3.increment(pose, allowed.include(allowed.fit(pose)))).max(initial=0.0) < 1e-10
+    assert largest(SE3.increment(pose, allowed.include(allowed.fit(pose))), initial=0.0) < 1e-10
     near = allowed.fit(pose, allowed.element(allowed.coordinates(x) + 1e-3))
     np.testing.assert_allclose(allowed.coordinates(near), allowed.coordinates(x), atol=1e-10)
 

@@ -373,7 +373,7 @@ def test_energies_balance_by_every_number_where_a_stop_begins(path, monkeypatch)
 
     def change():
         balance = found.of(lambda sol: sol.energy - sol.work)[:, 0]
-        return np.abs(balance - balance[0]).max()
+        return largest(balance - balance[0])
 
     assert np.any(np.abs(found.solution.joint("pin").coordinate[:, 0] - 0.3) < 1e-3)
     assert change() < 1e-6

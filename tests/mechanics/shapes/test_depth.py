@@ -11,6 +11,7 @@ from ephs.mechanics.shapes.gap import PENETRATED, UPRIGHT
 from ephs.mechanics.shapes.pairs import PAIRS, touches
 from ephs.semantics.spaces import SE3
 from tests.mechanics.elements.test_surface_pairs import DRAWN
+from tests.numerics import largest
 from tests.written import scene_of_text
 
 STEP, SMALL, FAR = 1e-3, 1e-7, 0.8
@@ -81,7 +82,7 @@ def test_normals_are_slopes_of_gaps_until_the_centre_is_near(pair, seed):
             rates = np.array([at - before, after - at]) / SMALL
             if gap.name == "face_rim":  # which is longer beside the face
                 continue
-            assert np.abs(rates).max() <= 1.0 + 0.1
+            assert largest(rates) <= 1.0 + 0.1
             if gap.name != "edges":  # which have a moment where they are nearly parallel
                 curved = min(SPAN, gap.support.depth / PENETRATED + at)
                 assert np.abs(rates - normal @ moved).min() <= UPRIGHT / curved + 1e-6
@@ -98,7 +99,7 @@ def test_a_ball_swings_on_a_face_that_its_centre_enters(shape):
     run = ephs.simulate(dropped(THICK[shape], 0.2 + RADIUS, stiffness), until, method="rk87", rtol=1e-10)
     swing = 0.9 * RADIUS * (1.0 - np.cos(np.sqrt(stiffness / MASS) * run.t))
     assert swing.max() > 1.5 * RADIUS
-    assert np.abs(run.body("ball").position[:, 2] - (0.2 + RADIUS - swing)).max() <= 1e-8
+    assert largest(run.body("ball").position[:, 2] - (0.2 + RADIUS - swing)) <= 1e-8
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from ephs.mechanics.elements.contact import lever
 from ephs.mechanics.shapes.gap import (
@@ -26,8 +25,8 @@ from ephs.semantics.derive.tape import over_step
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage.plain import PLAIN
+from tests.numerics import generators, largest, seeds
 
-SEEDS = st.integers(0, 2**32 - 1)
 ROUNDING = 4e-13
 """Of some two hundred operations, relative to the lengths that they begin with: 8 n ε."""
 ROUND = {
@@ -79,12 +78,12 @@ def drawn(rng, slender):
 
 
 @pytest.mark.parametrize("name", ROUND)
-@given(seed=SEEDS)
+@given(seed=seeds)
 @settings(max_examples=15, deadline=None)
 def test_slopes_of_round_shapes_are_wrenches(name, seed):
     rng, gap = np.random.default_rng(seed), ROUND[name]
     pose = np.concatenate([tilted(rng, 10.0 ** rng.uniform(-8, 0.5)), rng.normal(size=3)])
-    assert np.abs(slope(gap, pose) - wrench(gap, pose)).max() <= ROUNDING * (1.0 + np.abs(pose).sum())
+    assert largest(slope(gap, pose) - wrench(gap, pose)) <= ROUNDING * (1.0 + np.abs(pose).sum())
 
 
 def touched(rng, feature, body, *, first):
@@ -110,19 +109,19 @@ FOUND = {
 
 @pytest.mark.parametrize("first", [True, False])
 @pytest.mark.parametrize("name", FOUND)
-@given(seed=SEEDS)
+@given(rng=generators)
 @settings(max_examples=25, deadline=None)
-def test_slopes_of_features_are_along_wrenches(name, first, seed):
+def test_slopes_of_features_are_along_wrenches(name, first, rng):
     """The points that are searched are stationary, so nothing but the size of the slope differs.
 
     Chords of a disc are off by `LEANING`, and their nearest point moves along the disc by its size where it tilts by
     `UPRIGHT`.
     """
     feature, body, length = FOUND[name]
-    gap, pose = touched(np.random.default_rng(seed), feature, body, first=first)
+    gap, pose = touched(rng, feature, body, first=first)
     found, expected = slope(gap, pose), wrench(gap, pose)
     size = found @ expected / (expected @ expected)
-    assert np.abs(found - size * expected).max() <= LEANING / UPRIGHT
+    assert largest(found - size * expected) <= LEANING / UPRIGHT
     assert abs(size - 1.0) <= UPRIGHT * length / (feature.radius + body.radius) + LEANING
 
 
@@ -138,22 +137,22 @@ def errors(sizes, pose, length, parallel, passes):
 
 
 @pytest.mark.parametrize("slender", [1.0, 10.0, 50.0])
-@given(seed=SEEDS)
+@given(rng=generators)
 @settings(max_examples=60, deadline=None)
-def test_slopes_of_segments_are_wrenches(slender, seed):
+def test_slopes_of_segments_are_wrenches(slender, rng):
     """To rounding where they are not slender, whatever their angle."""
-    sizes, pose = drawn(np.random.default_rng(seed), slender)
+    sizes, pose = drawn(rng, slender)
     gap = segments(*sizes)
     length = float(gap.distance(pose)) + sizes[1] + sizes[3]
     rounding, left = errors(sizes, pose, length, PARALLEL, PASSES)
-    assert np.abs(slope(gap, pose) - wrench(gap, pose)).max() <= rounding + (left if slender > 1.0 else 0.0)
+    assert largest(slope(gap, pose) - wrench(gap, pose)) <= rounding + (left if slender > 1.0 else 0.0)
 
 
-@given(SEEDS)
+@given(generators)
 @settings(max_examples=60, deadline=None)
-def test_slopes_of_edges_are_wrenches_and_moments_about_the_common_normal(seed):
+def test_slopes_of_edges_are_wrenches_and_moments_about_the_common_normal(rng):
     """Moments only where they are nearly parallel, which lengthens the gap."""
-    sizes, pose = drawn(np.random.default_rng(seed), 10.0)
+    sizes, pose = drawn(rng, 10.0)
     half1, radius1, half2, radius2 = sizes
     gap, axes = edges(*sizes), quaternion_to_matrix(pose[:4])
     sine = float(np.hypot(axes[0, 2], axes[1, 2]))
@@ -162,19 +161,18 @@ def test_slopes_of_edges_are_wrenches_and_moments_about_the_common_normal(seed):
         return  # too parallel to act
     length = float(segments(*sizes).distance(pose)) + radius1 + radius2
     rest, most = slope(gap, pose) - wrench(gap, pose), sum(errors(sizes, pose, length, CROSSED, 1))
-    assert np.abs(rest[3:]).max() <= most
+    assert largest(rest[3:]) <= most
     if sine**2 >= square:
-        assert np.abs(rest).max() <= most
+        assert largest(rest) <= most
     else:
         moment = 4.0 * (half1 + half2) * sine / square
-        assert np.abs(np.array([axes[2], [0.0, 0.0, 1.0]]) @ rest[:3]).max() <= most + ROUNDING * moment
+        assert largest(np.array([axes[2], [0.0, 0.0, 1.0]]) @ rest[:3]) <= most + ROUNDING * moment
 
 
-@given(SEEDS)
+@given(generators)
 @settings(max_examples=60, deadline=None)
-def test_gaps_of_segments_change_by_no_more_than_their_points_move(seed):
+def test_gaps_of_segments_change_by_no_more_than_their_points_move(rng):
     """So they are continuous, where axes come to be parallel, too."""
-    rng = np.random.default_rng(seed)
     sizes, pose = drawn(rng, 10.0)
     gap, twist = segments(*sizes), rng.normal(size=6)
     if rng.random() < 0.5:

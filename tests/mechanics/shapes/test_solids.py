@@ -5,7 +5,6 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
@@ -15,6 +14,7 @@ from ephs.mechanics.shapes.hull import inside_of
 from ephs.mechanics.shapes.pairs import PAIRS, ROUNDED, touches
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from tests.numerics import largest, seeds
 
 SHAPES = ("plane", "sphere", "capsule", "cylinder", "box", "mesh")
 NEW = [pair for pair in PAIRS if {"mesh", "cylinder"} & set(pair) and "plane" not in pair]
@@ -48,7 +48,7 @@ def core(shape, sharp):
         if not sharp:
             hull, radius = inside_of(corners.tolist(), 2.0 * ROUNDED)
             corners = hull.corners
-    return (lambda way: corners[np.argmax(corners @ way)]), float(np.abs(corners).max()), radius
+    return (lambda way: corners[np.argmax(corners @ way)]), float(largest(corners)), radius
 
 
 def distance(one, other, pose):
@@ -80,7 +80,7 @@ def drawn(rng, kind):
 
 
 @pytest.mark.parametrize("pair", NEW, ids="-".join)
-@given(seed=st.integers(0, 2**32 - 1))
+@given(seed=seeds)
 @settings(max_examples=12, deadline=None)
 def test_the_least_gap_is_the_distance(pair, seed):
     """At poses where cores are about as far apart as their radii, and sides, caps and faces often nearly parallel."""
@@ -123,7 +123,7 @@ def cube(sizes):
 def test_what_is_inside_of_a_box_is_a_box():
     hull, depth = inside_of(cube([1.0, 0.4, 2.0]).reshape(-1, 3).tolist(), 2.0 * ROUNDED)
     assert depth == pytest.approx(ROUNDED * 0.4, rel=1e-12)
-    assert np.abs(hull.corners).max(axis=0) == pytest.approx([0.5 - depth, 0.2 - depth, 1.0 - depth], rel=1e-12)
+    assert largest(hull.corners, axis=0) == pytest.approx([0.5 - depth, 0.2 - depth, 1.0 - depth], rel=1e-12)
     assert (len(hull.corners), len(hull.edges), len(hull.faces)) == (8, 12, 6)
 
 
@@ -172,6 +172,6 @@ def test_what_stands_stays(low, up, tmp_path):
     sol = fallen(tmp_path, low, up, [0.02, 0.01, 0.2])
     up = sol.body("up")
     assert up.position[-1] == pytest.approx([0.02, 0.01, 0.2], abs=2e-4)
-    assert np.abs(up.quaternion[-1, 1:]).max() <= 2e-3
-    assert np.abs(sol.energy_error).max() <= 1e-11
+    assert largest(up.quaternion[-1, 1:]) <= 2e-3
+    assert largest(sol.energy_error) <= 1e-11
     assert sol.stats["least_production"] >= 0.0

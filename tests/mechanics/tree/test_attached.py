@@ -146,7 +146,7 @@ def test_derivatives_of_what_is_attached_are_those_of_the_equations(machine):
         step = 1e-5 * max(1.0, abs(middle[j])) * np.eye(middle.size)[j]
         near = (eq.rates(0.0, at.q, middle + step) - eq.rates(0.0, at.q, middle - step))[: exact.shape[0]]
         near /= 2.0 * step[j]
-        assert np.allclose(column, near, rtol=0.0, atol=1e-5 * max(1.0, largest(near)))
+        assert largest(column - near) <= 1e-5 * max(1.0, largest(near))
 
 
 def assert_dense_rates_agree(eq, state):
@@ -260,12 +260,10 @@ def test_balances_hold_where_all_but_the_largest_terms_nearly_vanish():
 
 def _led(ratio):
     """A rotor whose rate is ratio(angle) times the rate of a spring without mass."""
-    pattern = Pattern(
-        junctions={"q": junction(Q.angle), "p": junction(Q.angular_momentum), "b": junction(Q.momentum),
-                   "x": junction(Q.displacement)},
-        boxes={"angle": {"q": "q"}, "rotor": {"p": "p"}, "turn": {"q": "q", "p": "p"}, "spring": {"q": "x"},
-               "lead": {"a": "b", "b": "p", "q": "~q"}, "stretch": {"q": "x", "p": "b"}},
-    )  # fmt: skip
+    pattern = Pattern.from_text(
+        "q: angle; p: angular_momentum; b: momentum; x: displacement; angle(q); rotor(p); turn(q, p); spring(q=x);"
+        "lead(a=b, b=p, q=~q); stretch(q=x, p=b)"
+    )
     lead = ephs.transformer({"a": Q.momentum, "b": Q.angular_momentum, "~q": Q.angle}, lambda q: np.array([[ratio(q)]]))
     return pattern(
         angle=ephs.storage({"q": Q.angle}, lambda q: 0.0 * q), rotor=lib.rotor(j=0.02), lead=lead,

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs import quantity as Q
+from ephs.semantics.derive import charts
 from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import compiled, program, sizes
@@ -21,7 +22,7 @@ from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.stage import PLAIN
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.verdicts.checks import random_efforts, random_point
-from tests.numerics import EPS, generators, largest, seeds
+from tests.numerics import EPS, generators, largest, seeds, slope
 from tests.semantics.zoo import conduction_matrix, drag
 from tests.staged import run_both
 
@@ -67,13 +68,17 @@ RELATIONS = {
 }
 
 
-def arguments(relation, primitive, rng, length, h=0.01):
-    """Random arguments of a relation: a dict of arrays, in order."""
-    bundle = primitive.bundle
-    point = random_point(bundle, primitive.reads, rng)
+def zeros(relation, parameters=()):
+    """Arguments of a relation: a dict of arrays, in order."""
     a = {name: np.zeros(size) for name, size in sizes(relation).items()}
-    a["scal"][:] = h, 300.0, 1e-3
-    a["p"][:] = primitive.kernel.parameters
+    a["scal"][:], a["p"][:] = (0.01, 300.0, 1e-3), parameters
+    return a
+
+
+def arguments(relation, primitive, rng, length):
+    """Random ones, and the point among them."""
+    bundle = primitive.bundle
+    point, a = random_point(bundle, primitive.reads, rng), zeros(relation, primitive.kernel.parameters)
     a["x0"][:] = np.concatenate([point[port] for port in primitive.reads]) if primitive.reads else []
     a["v"][:] = length * rng.standard_normal(a["v"].size)
     if primitive.kind != "storage":
@@ -170,6 +175,20 @@ def test_slopes_of_functions_are_difference_quotients_without_cancellation(name,
     assert abs(found.start - float(one)) <= 20 * EPS * (1.0 + abs(float(one))) / (1.0 - a)
 
 
+def over(function, start, end):
+    """The slope of a function, recorded, over a step."""
+    recording = record(function, {"x": None})
+    parameters = [np.float64(number) for number in recording.parameters]
+    return over_step(Slopes(PLAIN), recording.tape, [Slope(np.float64(start), np.float64(end), {0: 1.0})], parameters)
+
+
+def at(function, x):
+    """The value and the derivative of a function, recorded."""
+    on, recording = Duals(PLAIN, 1), record(function, {"x": None})
+    parameters = [np.float64(number) for number in recording.parameters]
+    return on.dual(evaluate(on, recording.tape, [on.along(np.float64(x), 0)], parameters)[0])
+
+
 POWERS = st.sampled_from([k / 4.0 for k in range(1, 16)]) | st.floats(0.1, 4.0)
 
 
@@ -177,10 +196,8 @@ POWERS = st.sampled_from([k / 4.0 for k in range(1, 16)]) | st.floats(0.1, 4.0)
 def test_slopes_of_powers_are_difference_quotients_without_cancellation(power, decade, apart):
     """Over steps from any positive number, and from 0, where a root is vertical."""
     end = np.float64(10.0**decade)
-    start = end / (1.0 + 10.0**apart) if apart else np.float64(0.0)
-    recording = record(lambda x: x**power, {"x": None})
-    parameters = [np.float64(number) for number in recording.parameters]
-    found = over_step(Slopes(PLAIN), recording.tape, [Slope(start, end, {0: 1.0})], parameters)
+    start = end / (1.0 + 10.0**apart) if apart else 0.0
+    found = over(lambda x: x**power, start, end)
     with mpmath.workdps(60):
         a, b, p = (mpmath.mpf(float(x)) for x in (start, end, power))
         expected = (b**p - a**p) / (b - a) if a != b else p * a ** (p - 1)
@@ -201,28 +218,24 @@ RESTS = (
 @given(st.sampled_from([1.25, 1.5, 1.75, 2.5, 3.25]) | st.floats(1.1, 4.0))
 def test_what_grows_as_a_power_above_one_is_flat_at_zero(function, flat, power):
     """Values and derivatives there are those of springs and frictions at rest; a length has none."""
-    on, recording, zero = Duals(PLAIN, 1), record(lambda x: function(x, power), {"x": None}), np.float64(0.0)
-    parameters = [np.float64(number) for number in recording.parameters]
     with np.errstate(all="ignore"):
-        found = on.dual(evaluate(on, recording.tape, [on.along(zero, 0)], parameters)[0])
-        step = over_step(Slopes(PLAIN), recording.tape, [Slope(zero, zero, {0: 1.0})], parameters)
+        found, step = at(lambda x: function(x, power), 0.0), over(lambda x: function(x, power), 0.0, 0.0)
     assert ((found.value, found.slopes[0], step.slopes.get(0, 0.0)) == (0.0, 0.0, 0.0)) == flat
 
 
 @given(st.integers(65, 2000) | st.sampled_from([10**6, 10**9]), st.booleans(), st.floats(0.1, 3.0), st.booleans())
 def test_whole_powers_of_any_size_have_values_on_both_sides(size, inverse, near, negative):
     """As exact arithmetic says, with the rounding of n products: x is within 1/n of one, so that no power is 0 or ∞."""
-    n, on = -size if inverse else size, Duals(PLAIN, 1)
+    n = -size if inverse else size
     x = (-1.0 if negative else 1.0) * (1.0 + near / size)
-    found = on.dual(evaluate(on, record(lambda x: x**n, {"x": None}).tape, [on.along(np.float64(x), 0)], [])[0])
+    found = at(lambda x: x**n, x)
     with mpmath.workdps(40):
         value = mpmath.mpf(x) ** n
-        slope = n * value / mpmath.mpf(x)
+        rise = n * value / mpmath.mpf(x)
         assert abs(float(found.value / value) - 1.0) <= 4 * size * EPS
-        assert abs(float(found.slopes[0] / slope) - 1.0) <= 4 * size * EPS
-    broken = record(lambda x: x ** (n + 0.3), {"x": None})
+        assert abs(float(found.slopes[0] / rise) - 1.0) <= 4 * size * EPS
     with np.errstate(all="ignore"):
-        rest = evaluate(PLAIN, broken.tape, [np.float64(x)], [np.float64(p) for p in broken.parameters])[0]
+        rest = at(lambda x: x ** (n + 0.3), x).value
     assert np.isnan(rest) == negative, "what is no whole number has none below zero"
 
 
@@ -237,10 +250,10 @@ def test_functions_and_their_derivatives_have_all_digits_near_zero(name, decade,
     found = on.dual(OPERATIONS[name](on, on.along(np.float64(x), 0)))
     with mpmath.workdps(60):
         function = EXACT.get(name) or getattr(mpmath, name)
-        at = mpmath.mpf(x)
-        value, slope = function(at), mpmath.diff(function, at, h=abs(at) * mpmath.mpf(10) ** -25)
+        here = mpmath.mpf(x)
+        value, rise = function(here), mpmath.diff(function, here, h=abs(here) * mpmath.mpf(10) ** -25)
         assert abs(float(found.value / value) - 1.0) <= 16 * EPS
-        assert abs(float(found.slopes[0] / slope) - 1.0) <= 16 * EPS
+        assert abs(float(found.slopes[0] / rise) - 1.0) <= 16 * EPS
 
 
 def test_every_function_is_tried():
@@ -289,17 +302,17 @@ def test_jacobians_are_derivatives(name, rng):
     rows = ("e",) if stores else ("f", "c")
     found = run(call, relation, a)[1]["f" if stores else "jac"].reshape(-1, len(place))
     for j, (argument, i) in enumerate(place):
-        values = a[argument]
-        h = 1e-5 * max(1.0, abs(values[i]))
-        kept, ends = values[i], []
-        for times in (1.0, -1.0, 2.0, -2.0):
-            values[i] = kept + times * h
+        kept = a[argument][i]
+
+        def moved_by(d, values=a[argument], i=i, kept=kept):
+            values[i] = kept + d
             out = run(call, relation, a)[1]
-            ends.append(np.concatenate([out[row] for row in rows]))
-        values[i] = kept
-        slope = (8.0 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12.0 * h)
+            values[i] = kept
+            return np.concatenate([out[row] for row in rows])
+
+        expected, size = slope(moved_by, 2e-5 * max(1.0, abs(kept)), 1), largest(moved_by(0.0))
         # a difference carries ε/h of the values, and h⁴ of fifth derivatives: near half a turn the third ones are large
-        assert largest(found[:, j] - slope) <= 1e-9 * (1.0 + largest(ends[0]) + largest(found))
+        assert largest(found[:, j] - expected) <= 1e-9 * (1.0 + size + largest(found))
 
 
 @pytest.mark.parametrize("name", ["drag", "conduction"])
@@ -332,21 +345,18 @@ def test_reversible_relations_exchange_power_and_lose_none(name, rng):
 @given(rng=generators, length=st.sampled_from([1e-9, 1e-4, 0.1, 1.0]))
 def test_points_over_a_step_are_those_of_the_groups(code, rng, length):
     """The ends by other code; their difference by the slopes."""
-    from ephs.semantics.derive.charts import moved as retracted
-    from ephs.semantics.derive.charts import over
-
     space = next(
         manifold(q.space) for q in (Q.pose, Q.direct_pose, Q.relative_pose("planar"), Q.relative_pose("spherical"))
         if manifold(q.space).code == code
     )  # fmt: skip
     x, v = space.random(rng), length * rng.standard_normal(space.dim)
-    numbers = over(PLAIN, code, list(x), list(v), 0)
+    numbers = charts.over(PLAIN, code, list(x), list(v), 0)
     size = 1.0 + largest(x)
     there = space.retract(x, v)
     if code != codes.SE2 and there[:4] @ [float(number.end) for number in numbers[:4]] < 0.0:
         there[:4] *= -1.0  # the same rotation
-    for number, start, end, other in zip(numbers, x, there, retracted(PLAIN, code, list(x), list(v)), strict=True):
-        change = sum(slope * v[i] for i, slope in number.slopes.items())
+    for number, start, end, other in zip(numbers, x, there, charts.moved(PLAIN, code, list(x), list(v)), strict=True):
+        change = sum(of * v[i] for i, of in number.slopes.items())
         assert number.start == start
         assert abs(number.end - end) + abs(other - end) <= 60 * EPS * size
         assert abs(change - (number.end - number.start)) <= 60 * EPS * size
@@ -356,8 +366,8 @@ def test_a_domain_bounds_both_ends_of_a_step():
     storage = ephs.storage({"q": Q.displacement}, lambda q: q * q, domain={"q": (-1.0, 1.0)})
     relation = storage.kernel.relation
     for x, v, status in ((0.5, 0.4, 0), (0.5, 0.6, 5), (1.5, -1.0, 5)):
-        a = {name: np.zeros(size) for name, size in sizes(relation).items()}
-        a["scal"][:], a["x0"][:], a["v"][:] = (0.01, 300.0, 0.0), x, v
+        a = zeros(relation)
+        a["x0"][:], a["v"][:] = x, v
         assert run(compiled(relation), relation, a)[0] == status
 
 
@@ -382,8 +392,8 @@ def test_slopes_of_friction_that_grows_as_a_power_of_the_speed_are_finite_at_res
     made = drag(lambda p, s: abs(p) ** power)()
     relation, slopes = made.kernel.relation, {}
     for speed in (0.0, 1e-200):
-        a = {name: np.zeros(size) for name, size in sizes(relation).items()}
-        a["scal"][:], a["p"][:], a["e"][0] = (0.01, 300.0, 1e-3), made.kernel.parameters, speed
+        a = zeros(relation, made.kernel.parameters)
+        a["e"][0] = speed
         status, out = run(compiled(relation), relation, a)
         assert status == 0
         slopes[speed] = out["jac"][0]

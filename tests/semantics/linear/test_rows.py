@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from ephs.semantics.linear.rows import row_program
 from ephs.semantics.spaces.rank import EXPLICIT
-from tests.numerics import EPS, largest, seeds
+from tests.numerics import EPS, generators, largest
 from tests.staged import run_both
 
 
@@ -36,7 +36,7 @@ def problems(draw):
     """(rows, mass matrix, attainable targets, rank): rows are integer combinations of as many integer rows."""
     n, m = draw(st.integers(1, 7)), draw(st.integers(1, 6))
     rank = draw(st.integers(0, min(n, m)))
-    rng = np.random.default_rng(draw(seeds))
+    rng = draw(generators)
     base = np.eye(rank, n)[:, rng.permutation(n)] * rng.choice([-2.0, 1.0], (rank, 1))
     mixed = np.eye(m, rank)[rng.permutation(m)] + np.where(rng.random((m, rank)) < 0.2, 1.0, 0.0)
     mixed[:rank] = np.eye(rank)

@@ -19,6 +19,7 @@ from ephs.semantics.stage import Entry, Program, llvm, objects, store, vector
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.objects import TARGETS, compiled, emitted, fitting, telling
 from ephs.semantics.stage.store import STORE, ObjectCacheWarning
+from tests.processes import printed
 from tests.semantics.stage.arm import Arm
 from tests.semantics.stage.test_elementary import PROGRAM, inputs
 from tests.staged import bits
@@ -196,7 +197,7 @@ def load_where_memory_is_scattered() -> None:
 def test_code_is_loaded_where_free_memory_is_scattered():
     """Addresses in code have 32 bits: code and tables of an object must be placed together."""
     code = "from tests.semantics.stage import test_objects; test_objects.load_where_memory_is_scattered()"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    printed(code)
 
 
 def many() -> tuple[np.ndarray, np.ndarray]:

@@ -2,10 +2,7 @@
 
 import ast
 import json
-import os
 import struct
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +15,7 @@ from ephs.semantics.stage.objects import FITTING, TARGETS, compiled, fitting
 from ephs.semantics.stage.shipping import INDEX, ship, shipped
 from ephs.semantics.stage.store import STORE
 from ephs.shipped import SHIPPED, programs, write_objects
+from tests.processes import printed
 from tests.rooms import SOURCES, module_name
 from tests.semantics.stage.arm import SYMBOLS, sections
 from tests.semantics.stage.test_objects import SMALL, value
@@ -75,14 +73,6 @@ def test_what_is_compiled_again_is_the_same(folder, name):
     assert shipped(PROGRAMS[name].text(), [target], folder) == objects.emitted(PROGRAMS[name].text(), target)
 
 
-def said(code: str, **environment: str) -> str:
-    """What another process prints."""
-    found = subprocess.run(
-        [sys.executable, "-c", code], env=os.environ | environment, capture_output=True, text=True, check=True
-    )
-    return found.stdout
-
-
 def test_another_process_has_the_same_texts():
     """The index finds a program in any process: its text holds no order of sets and no place in memory."""
     code = (
@@ -90,7 +80,7 @@ def test_another_process_has_the_same_texts():
         "print({program.name: _digest(program.text().encode()) for program in programs()})"
     )
     digests = {name: shipping._digest(program.text().encode()) for name, program in PROGRAMS.items()}
-    assert ast.literal_eval(said(code, PYTHONHASHSEED="271")) == digests
+    assert ast.literal_eval(printed(code, PYTHONHASHSEED="271")) == digests
 
 
 MOTIONS = """
@@ -98,7 +88,7 @@ import sys
 from pathlib import Path
 import ephs
 from ephs.semantics.stage import objects, shipping
-folder, targets, taken = Path({folder!r}), {targets!r}, set()
+folder, targets, taken = Path('{folder}'), {targets!r}, set()
 names = {{digest: next(iter(files.values()))[0] for digest, files in shipping._index(folder).items()}}
 def given(text, _):
     code = shipping.shipped(text, targets, folder)
@@ -111,7 +101,7 @@ for scene, method, options in (
     ("slider-crank", "rk87", {{}}), ("chain", "rk87", {{}}), ("chain", "radau", {{}}),
     ("four-bar", "natural", {{"step": 0.01}}),
 ):
-    motion = ephs.simulate(ephs.load(Path({scenes!r}) / f"{{scene}}.toml"), 0.05, method=method, audit="off", **options)
+    motion = ephs.simulate(ephs.load(f"scenes/{{scene}}.toml"), 0.05, method=method, audit="off", **options)
     bits.append(motion.t.tobytes().hex() + motion.energy.tobytes().hex())
 print([sorted(taken), bits])
 """
@@ -120,9 +110,8 @@ TAKEN = {"motion_of_loops", "motion_of_trees", "stiff_steps_of_trees", "natural"
 
 def test_motions_have_the_same_bits_by_what_is_shipped_and_by_what_is_compiled(folder):
     """Of programs that call others by address, too, which the emulator of arm64 does not run."""
-    scenes = Path(__file__).parents[3] / "scenes"
     targets = [[], *([target] for target in fitting(llvm.host()))]
-    found = [ast.literal_eval(said(MOTIONS.format(folder=str(folder), targets=t, scenes=str(scenes)))) for t in targets]
+    found = [ast.literal_eval(printed(MOTIONS.format(folder=folder, targets=t))) for t in targets]
     assert not found[0][0] and all(set(taken) >= TAKEN for taken, _ in found[1:])
     assert all(bits == found[0][1] for _, bits in found)
 

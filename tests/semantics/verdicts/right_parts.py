@@ -8,12 +8,12 @@ import ephs
 from ephs import library
 from ephs import quantity as Q
 from ephs.operad import Quantity, Space
-from tests.semantics.verdicts.wrong_parts import CB, QP, TURN, X, conduct, drag, gyrator, large, stored
+from tests.semantics.verdicts.wrong_parts import CB, QP, TURN, X, conduct, drag, gyrator, hidden, large, some, stored
 
 
 def motor(source):
     """A constant gyrator between odd quantities, in a magnet's field; with the numbers as a product leaves them."""
-    k = source.uniform(0.1, 3.0) * 0.1 / 0.3
+    k = some(source) * 0.1 / 0.3
     return gyrator({"p": Q.momentum, "b": Q.flux_linkage}, k * TURN, external_field=True)
 
 
@@ -32,7 +32,7 @@ def lorentz(source):
 
 def two_units(source):
     whole = np.zeros((4, 4))
-    whole[:2, :2], whole[2:, 2:] = large(source) * TURN, source.uniform(0.1, 3.0) * TURN
+    whole[:2, :2], whole[2:, 2:] = large(source) * TURN, some(source) * TURN
     return gyrator({**QP, **CB}, whole)
 
 
@@ -48,7 +48,7 @@ def turned(source):
 
 def skew_of_states(source):
     a, b = source.uniform(-2.0, 2.0), source.uniform(-2.0, 2.0)
-    hide = source.choice((float, lambda x: x))
+    hide = hidden(source)
 
     def matrix(x):
         y = hide(x)
@@ -100,7 +100,7 @@ def rotated_pair(source):
 
 
 def convex(source):
-    a, b = source.uniform(0.1, 3.0), source.uniform(0.1, 3.0)
+    a, b = some(source), some(source)
     energy, gradient = source.choice((
         (lambda q: a * q**4 + b * q**2, lambda q: [4.0 * a * q**3 + 2.0 * b * q]),
         (lambda q: a * (np.cosh(b * q) - 1.0), lambda q: [a * b * np.sinh(b * q)]),
@@ -112,7 +112,7 @@ def convex(source):
 
 
 def convex_hidden(source):
-    a, b = source.uniform(0.1, 3.0), source.uniform(0.1, 3.0)
+    a, b = some(source), some(source)
     energy, gradient = source.choice((
         (lambda q: a * float(q) ** 4 + b, lambda q: [4.0 * a * float(q) ** 3]),
         (lambda q: a * math.cosh(b * float(q)), lambda q: [a * b * math.sinh(b * float(q))]),
@@ -138,7 +138,7 @@ def several_states(source):
 
 
 def warm(source):
-    a, b = source.uniform(0.1, 3.0), source.uniform(1.0, 300.0)
+    a, b = some(source), source.uniform(1.0, 300.0)
     energy = source.choice((
         lambda s: a * np.exp(s / b),
         lambda s: a * b * s + np.log(1.0 + np.exp(s)),
@@ -148,7 +148,7 @@ def warm(source):
 
 
 def damper(source):
-    a, b = source.uniform(0.1, 3.0), source.uniform(0.1, 3.0)
+    a, b = some(source), some(source)
     d = source.choice((
         lambda p, s: a, lambda p, s: abs(p), lambda p, s: p**2, lambda p, s: a * abs(p) + b * p**2,
         lambda p, s: a * np.exp(-b * p**2), lambda p, s: a / np.sqrt(b + p**2), lambda p, s: a * np.exp(-s / 300.0),
@@ -158,12 +158,12 @@ def damper(source):
 
 
 def valve(source):
-    a = source.uniform(0.1, 3.0)
+    a = some(source)
     return drag(lambda p, s: a * (1.0 + np.tanh(p)), one_sided=True)
 
 
 def conductor(source):
-    a = source.uniform(0.1, 3.0)
+    a = some(source)
     k = source.choice((
         lambda x, y: a, lambda x, y: a * x * y, lambda x, y: a * (x + y), lambda x, y: a * (x**2 + y**2) * (x + y),
         lambda x, y: math.sqrt(float(x) * float(y)),
@@ -173,7 +173,7 @@ def conductor(source):
 
 def friction_of_two(source):
     """Both bodies of a contact are heated; a matrix of rank one, and a lawful block of other units."""
-    a, b = source.uniform(0.1, 3.0), large(source)
+    a, b = some(source), large(source)
 
     def matrix(p, r, s, x, y):
         n = np.array([s, -s, r - p, 0.0 * x, 0.0 * y])
@@ -201,7 +201,7 @@ def sheared(source):
 
 def frozen(source):
     """A process that stops in the cold: its matrix is below the smallest normal number there."""
-    size, activation = source.uniform(0.1, 3.0), source.uniform(735.0, 743.0)
+    size, activation = some(source), source.uniform(735.0, 743.0)
     return drag(lambda p, s: size * math.exp(-activation * 273.15 / float(s)), domain={"s": (270.0, math.inf)})
 
 
@@ -219,7 +219,7 @@ def large_beside_a_sine(source):
 
 def faint(source):
     """A process whose matrix is below the smallest normal number."""
-    size = source.uniform(0.1, 3.0)
+    size = some(source)
     return drag(lambda p, s: 1e-160 * s * (size * 1e-160))
 
 

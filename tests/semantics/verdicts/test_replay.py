@@ -28,6 +28,7 @@ from ephs.semantics.verdicts.proving import proof_of, replay
 from ephs.semantics.verdicts.replay import replayed
 from ephs.semantics.verdicts.sums import Unexpandable, number_of, scaled
 from ephs.semantics.verdicts.verdict import as_evidence
+from tests.numerics import jacobian, slope
 from tests.semantics.test_primitives import ARGUMENTS, made
 from tests.semantics.zoo import drag
 
@@ -94,13 +95,19 @@ def mutations(evidence, source, count):
             yield changed(evidence, at, value)
 
 
+FUNCTIONS = {word: (least, function) for word, (least, _, function) in OPERATIONS.items()} | {
+    "sinhc": (1, sinhc),
+    "turn_ratio": (1, turn_ratio),
+    "turn_curve": (1, turn_curve),
+    "squared turn": (4, lambda *q: squared_turn(q)),
+}
+
+
 def number(term, x):
     """A term's value."""
     if not isinstance(term, tuple):
         return x[term] if isinstance(term, str) else term
-    if term[0] == "sinhc":
-        return sinhc(number(term[1], x))
-    return OPERATIONS[term[0]][2](*(number(each, x) for each in term[1:]))
+    return FUNCTIONS[term[0]][1](*(number(each, x) for each in term[1:]))
 
 
 def proves(primitive, statement, evidence):
@@ -246,28 +253,15 @@ def test_what_is_no_identity_does_not_expand_to_zero(one, other):
     assert not on.vanishes(apart)
 
 
-FUNCTIONS = {word: (least, function) for word, (least, _, function) in OPERATIONS.items()} | {
-    "sinhc": (1, sinhc),
-    "turn_ratio": (1, turn_ratio),
-    "turn_curve": (1, turn_curve),
-    "squared turn": (4, lambda *q: squared_turn(q)),
-}
-
-
 @pytest.mark.parametrize("word", FUNCTIONS)
 def test_what_a_function_expands_to_has_its_value_and_its_slope(word):
-    def value(term, x):
-        if isinstance(term, tuple):
-            return FUNCTIONS[term[0]][1](*(value(each, x) for each in term[1:]))
-        return x if term == "x" else term
-
     on, (count, function) = Expander(), FUNCTIONS[word]
     more = [0.75, 0.5, 0.25][: count - 1]
     found = on.function(word, on.atom("symbol", "x", False), *(number_of(Fraction(each)) for each in more))
-    x, step = 1.3 if word == "acosh" else 0.7, 1e-5  # of which h² and ε/h are left in a slope
-    assert value(on.term(found), x) == pytest.approx(function(x, *more), rel=1e-14, abs=0.0)
-    change = function(x + step, *more) - function(x - step, *more)
-    assert value(on.term(on.slope(found, "x")), x) == pytest.approx(change / (2 * step), rel=1e-8)
+    x = 1.3 if word == "acosh" else 0.7
+    assert number(on.term(found), {"x": x}) == pytest.approx(function(x, *more), rel=1e-14, abs=0.0)
+    expected = slope(lambda d: function(x + d, *more), 1e-5)  # of which h² and ε/h are left
+    assert number(on.term(on.slope(found, "x")), {"x": x}) == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -317,12 +311,10 @@ def test_documents_carry_proofs_and_tampered_ones_are_refused():
 def test_frames_are_the_derivatives_of_retractions(space):
     group, rng = manifold(space), np.random.default_rng(3)
     symbols = tuple(f"x{i}" for i in range(group.size))
-    x, step = group.random(rng), 1e-6
+    x = group.random(rng)
     rows = frame_of(Seen(symbols, (-np.inf, np.inf), group.code, 1))
     found = [[number(entry, dict(zip(symbols, x, strict=True))) for entry in row] for row in rows]
-    sides = ([group.retract(x, s * step * v) for v in np.eye(group.dim)] for s in (1.0, -1.0))
-    expected = (np.array(next(sides)) - np.array(next(sides))).T / (2.0 * step)
-    assert np.allclose(found, expected, atol=1e-9)
+    assert np.allclose(found, jacobian(lambda v: group.retract(x, v), group.dim, 1e-6), atol=1e-9)
 
 
 def test_the_gradient_of_a_turned_energy_is_proved_and_a_wrong_one_is_not():
@@ -331,7 +323,7 @@ def test_the_gradient_of_a_turned_energy_is_proved_and_a_wrong_one_is_not():
     def height(q):
         return 3.0 * q[6]
 
-    def slope(q):
+    def lift(q):
         w, a, b, c = q[0], q[1], q[2], q[3]
         return [
             np.array(
@@ -340,9 +332,9 @@ def test_the_gradient_of_a_turned_energy_is_proved_and_a_wrong_one_is_not():
         ]
 
     _, _, gradient, _ = STATEMENTS["storage"]
-    lifted = ephs.storage({"q": Q.pose}, height, slope)
+    lifted = ephs.storage({"q": Q.pose}, height, lift)
     assert replay(lifted, {gradient: ["expansion", "as given"]}) == {gradient}
-    wrong = replace(lifted, formula=Formula(height, (), lambda q: [-slope(q)[0]]), trusted=True)
+    wrong = replace(lifted, formula=Formula(height, (), lambda q: [-lift(q)[0]]), trusted=True)
     assert not replay(wrong, {gradient: ["expansion", "as given"]})
 
 

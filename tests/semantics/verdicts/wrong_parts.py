@@ -35,6 +35,16 @@ def large(source):
     return 10.0 ** source.choice((-9.0, 9.0)) * source.uniform(0.5, 2.0)
 
 
+def some(source):
+    """A number of about one."""
+    return source.uniform(0.1, 3.0)
+
+
+def hidden(source):
+    """A function that leaves numbers as they are, and records whole or not at all."""
+    return source.choice((float, lambda x: x))
+
+
 def beside(source, block, ports):
     """A lawful gyrator beside a block (2, 2) of other units."""
     whole = np.zeros((4, 4))
@@ -72,19 +82,19 @@ def volume_of_a_constraint(source):
 
 def energy_of_a_function(source):
     ports, whole = beside(source, leak(source) * np.array([[0.0, 1.0], [1.0, 0.0]]), CB)
-    hide = source.choice((float, lambda x: x))
+    hide = hidden(source)
     return gyrator({**ports, **X}, lambda x: hide(x) * whole)
 
 
 def entropy_of_a_function(source):
     ports, whole = beside(source, leak(source) * TURN, {"b": Q.flux_linkage, "s": Q.entropy})
-    hide = source.choice((float, lambda x: x))
+    hide = hidden(source)
     return gyrator({**ports, **X}, lambda x: (1.0 + hide(x) ** 2) * whole)
 
 
 def parity_of_a_function(source):
     ports, whole = beside(source, leak(source) * TURN, {"b": Q.flux_linkage, "i": Q.magnetic_flux})
-    hide = source.choice((float, lambda x: x))
+    hide = hidden(source)
     return gyrator({**ports, **X}, lambda x: np.exp(hide(x)) * whole)
 
 
@@ -272,7 +282,7 @@ def gradient_off_hidden(source):
 def gradient_off_along_a_direction(source):
     angle, size = source.uniform(0.0, math.pi), 10.0 ** source.uniform(-6.0, -2.0)
     c, s = size * math.cos(angle), size * math.sin(angle)
-    hide = source.choice((float, lambda x: x))
+    hide = hidden(source)
     return (
         stored(
             lambda q, x: hide(q) ** 2 + hide(x) ** 2,
@@ -322,7 +332,7 @@ def cold_of_extreme_numbers(source):
 
 def energy_that_jumps(source):
     """By a turn where the angle's cut is passed: it has no gradient there."""
-    size, other = source.uniform(0.1, 3.0), source.uniform(0.1, 3.0)
+    size, other = some(source), some(source)
     ports = {"a": Q.displacement, "b": Q.displacement}
     return stored(lambda a, b: other * a**2 + size * np.arctan2(a, b), ports=ports)
 

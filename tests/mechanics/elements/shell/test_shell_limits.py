@@ -64,9 +64,7 @@ def mounted(n, arm=0.05, mass=1.0, inertia=0.1):
     pose = shifted(length + arm, 0.0, 0.0)
     sheet = shell_system(shell, held=clamped, carried={"p_body": (pose, end)})
     body = rigid_body(mass, [inertia] * 3, STILL).with_initial({"pe.q": pose})
-    system = Pattern(junctions={"p": MOMENTUM}, boxes={"sheet": {"p_body": "p"}, "body": {"p": "p"}})(
-        sheet=sheet, body=body
-    )
+    system = Pattern.from_text("p: body_momentum; sheet(p_body=p); body(p)")(sheet=sheet, body=body)
     bend = young * width * h**3 / 12.0 / length**3
     stiffness = bend * np.array([[12.0, -6.0 * length], [-6.0 * length, 4.0 * length**2]])
     inner = np.array([[mass, mass * arm], [mass * arm, inertia + mass * arm**2]])  # of deflection and slope of the end
@@ -96,7 +94,7 @@ def off_rigid(young):
     start = {f"node{i}.ke.p": [*(turning[i] * spin), *(mass[i] * speeds[i])] for i in range(len(points))}
     options = {"method": "rk87", "rtol": 1e-8, "atol": 1e-11, "save_at": np.linspace(0.0, 0.2, 41)}
     sheet = ephs.simulate(shell_system(shell), 0.2, initial=start, **options)
-    whole = Pattern(junctions={"p": MOMENTUM}, boxes={"body": {"p": "p"}})(body=rigid_body(mass.sum(), inertia, STILL))
+    whole = Pattern.from_text("p: body_momentum; body(p)")(body=rigid_body(mass.sum(), inertia, STILL))
     begun = {"body.pe.q": shifted(*centre), "body.ke.p": [*(inertia @ spin), 0.0, 0.0, 0.0]}
     pose = ephs.simulate(whole, 0.2, initial=begun, **options)["body.pe.q"]
     places = [compose(pose, np.broadcast_to(shifted(*arm), pose.shape))[:, 4:] for arm in arms]

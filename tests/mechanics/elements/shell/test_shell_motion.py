@@ -8,7 +8,7 @@ from scipy.linalg import block_diag, eigh
 from scipy.spatial.transform import Rotation
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs.mechanics import Shell, ShellSection, joint, rigid_body
 from ephs.mechanics.elements.shell.mesh import grid
 from ephs.mechanics.elements.shell.shell import moved
@@ -336,9 +336,8 @@ def test_a_body_hangs_at_a_shared_node():
         "weight": rigid_body(0.1, [1e-4] * 3).with_initial({"pe.q": [1.0, 0.0, 0.0, 0.0, 0.4, 0.2, -0.05]}),
         "joint": joint("spherical", frame2={"position": [0.0, 0.0, 0.05]}),
     }
-    momentum = junction(ephs.quantity.body_momentum)
-    boxes = {"strip": {"p5": "p"}, "weight": {"p": "q"}, "joint": {"p1": "p", "p2": "q"}}
-    system = Pattern(junctions={"p": momentum, "q": momentum}, boxes=boxes)(**parts)
+    pattern = "p: body_momentum; q: body_momentum; strip(p5=p); weight(p=q); joint(p1=p, p2=q)"
+    system = Pattern.from_text(pattern)(**parts)
     ends = []
     for method in ("auto", "radau"):
         solution = ephs.simulate(system, 0.01, method=method, rtol=1e-8)

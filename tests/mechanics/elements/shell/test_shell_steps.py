@@ -73,11 +73,11 @@ def test_parts_that_are_not_checked_one_by_one_pass_the_checks(options):
 
 
 @settings(max_examples=3)
-@given(seeds)
-def test_a_loss_of_several_poses_acts_as_the_relations_say(seed):
+@given(generators)
+def test_a_loss_of_several_poses_acts_as_the_relations_say(rng):
     problem = problem_of_system(patch((2, 1)))
     equations = ReducedEquations(problem, 0.0)
-    held_to_the_general_form(equations, problem, strained(equations, np.random.default_rng(seed)))
+    held_to_the_general_form(equations, problem, strained(equations, rng))
 
 
 def test_what_is_damped_has_no_cut_joints_and_no_network():
@@ -187,7 +187,7 @@ def test_systems_of_sparse_matrices_are_solved(rng, h, pair, heated, dissecting)
 
 def lattice(points, ways):
     """The matrix of points (n, 3) each of which acts on all within one step in each direction."""
-    near = np.abs(points[:, None] - points[None]).max(axis=2) < 1.5
+    near = largest(points[:, None] - points[None], axis=2) < 1.5
     return csc_array(np.where(near, -1.0, 0.0) + np.diag(ways + near.sum(axis=1)))
 
 
