@@ -244,7 +244,7 @@ def test_from_its_file(drawing, tmp_path):
         return [*of_joints, *contacts, *places(solution).values()]
 
     for one, other in zip(readings(again), readings(run(drawing)), strict=True):
-        assert largest(one - other) <= 1e-12 * (1.0 + largest(other, initial=0.0))
+        assert largest(one - other, initial=0.0) <= 1e-12 * (1.0 + largest(other, initial=0.0))
 
 
 @drawings("jointed", "touching", "hard")

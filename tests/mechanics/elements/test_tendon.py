@@ -138,7 +138,7 @@ def test_a_bob_across_a_damped_tendon_moves_as_equations_by_hand_say(method, opt
     sol = ephs.simulate(scene, 1.0, method=method, save_at=[0.0, 1.0], audit="off", **options)
     z, v, heat = solve_ivp(swinging, (0.0, 1.0), [0.3, 1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     rail = sol.joint("rail")
-    found = [rail.coordinate[-1, 0], rail.rate[-1, 0], sol.heat[-1]]
+    found = np.array([rail.coordinate[-1, 0], rail.rate[-1, 0], sol.heat[-1]])
     assert largest(found - [z, v, heat]) <= 10.0 * near
     assert np.all(np.diff(sol.heat) >= 0.0)
     assert sol.energy_error.max() < 1e-10
