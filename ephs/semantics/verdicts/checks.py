@@ -218,11 +218,20 @@ def _finite(*matrices: Array) -> bool:
     return all(bool(np.all(np.isfinite(matrix))) for matrix in matrices)
 
 
-def _scaled(matrix: Array) -> Array:
-    """Rows and columns divided by the roots of the diagonal: scaling of quantities with different units."""
+def unit_free(matrix: Array) -> tuple[Array, Array, float]:
+    """M with rows and columns divided by the roots of its diagonal.
+
+    Returns
+    -------
+    weight, scaled, allowed
+        What rows and columns (n,) are multiplied by, the matrix (n, n), and what rounding may do to its entries.
+    """
     size = np.sqrt(np.abs(np.diag(matrix)))
     size = np.where(size > 0.0, size, np.sqrt(np.abs(matrix).max(axis=1, initial=0.0)))
-    return 1.0 / np.where(size > 0.0, size, 1.0)
+    weight = 1.0 / np.where(size > 0.0, size, 1.0)
+    scaled = weight[:, None] * matrix * weight
+    least = float((weight[:, None] * TINY * weight).max(initial=0.0))
+    return weight, scaled, TOLERANCE * float(np.abs(scaled).max(initial=0.0)) + least
 
 
 def _check_irreversible(irreversible: "Irreversible", trial: Trial) -> None:
@@ -233,11 +242,7 @@ def _check_irreversible(irreversible: "Irreversible", trial: Trial) -> None:
     if matrix.shape != (bundle.size, bundle.size):
         raise StructureError("onsager-shape", name, found=matrix.shape, expected=(bundle.size, bundle.size))
     _require_finite(irreversible, trial, "the matrix M", matrix)
-    weight = _scaled(matrix)
-    even = weight[:, None] * matrix * weight
-    allowed = TOLERANCE * float(np.abs(even).max(initial=0.0)) + float(
-        (weight[:, None] * TINY * weight).max(initial=0.0)
-    )
+    weight, even, allowed = unit_free(matrix)
     defect = even - even.T
     if not np.abs(defect).max(initial=0.0) <= allowed:
         entry = _worst(defect)

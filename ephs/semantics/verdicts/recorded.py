@@ -17,7 +17,9 @@ from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.recording import Recording, Untraceable, record
 from ephs.semantics.primitives.forms import own_tape, run_tape, stacked
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.stage.elementary import WHOLE_TURNS
+from ephs.semantics.verdicts.checks import unit_free
 from ephs.semantics.verdicts.rounding import ROUNDED, Factor, exactly, rounding, steps_of
 from ephs.semantics.verdicts.trials import (
     NEAR,
@@ -115,12 +117,12 @@ def require_steady(primitive: "Primitive") -> None:
 def beyond_rounding(
     primitive: "Primitive", trial: Trial, otherwise: StructureError | None = None
 ) -> StructureError | None:
-    """An identity of a matrix that is off by more than rounding of its record's operations.
+    """An identity or the sign of a matrix that is off by more than rounding of its record's operations.
 
     Parameters
     ----------
     otherwise
-        The answer where there is no matrix, or no record of it.
+        The answer where there is no matrix, or no record of it; without it the sign is not looked at.
     """
     tape = None if primitive.kernel is None else own_tape(primitive.kernel)
     if tape is None or primitive.kernel is None or primitive.kind not in ("reversible", "irreversible"):
@@ -128,6 +130,7 @@ def beyond_rounding(
     bundle, first, irreversible = primitive.bundle, len(primitive.kernel.potentials), primitive.kind == "irreversible"
     recording = Recording(tape, primitive.kernel.parameters[first : first + tape.parameters])
     numbers, outputs, n = _flat(_given(primitive, trial)), list(tape.outputs), bundle.size
+    signed = irreversible and otherwise is not None  # the search finds the simplest state
     if otherwise is not None:
         own = _own(primitive, trial)
         try:  # a record says nothing of another matrix
@@ -142,7 +145,8 @@ def beyond_rounding(
     def defects(factor: Factor) -> Array:
         rows = steps_of(recording, numbers, factor)[outputs].reshape(-1, n)
         turned = rows[:n] - rows[:n].T if irreversible else rows[:n] + rows[:n].T
-        return np.concatenate([turned, *([rows @ vector] for *_, vector in vectors)], axis=None)
+        sign = [_negative(rows)] if signed else []
+        return np.concatenate([turned, *([rows @ vector] for *_, vector in vectors), sign], axis=None)
 
     with np.errstate(all="ignore"):
         found = defects(exactly)
@@ -150,6 +154,9 @@ def beyond_rounding(
     if not off.any():
         return None
     place = int(np.argmax(off))
+    if signed and place == off.size - 1:
+        least = float(symmetric_eigenvalues(steps_of(recording, numbers)[outputs].reshape(n, n)).min())
+        return StructureError("definite", primitive.name, found=least, witness=trial.witness(primitive, (), least))
     kind, charge, entry = "symmetry" if irreversible else "isotropy", "", (place // n, place % n)
     if place >= n * n:
         number, row = divmod(place - n * n, len(outputs) // n)
@@ -157,6 +164,13 @@ def beyond_rounding(
     size = float(found[place])
     witness = trial.witness(primitive, entry, size)
     return StructureError(kind, primitive.name, found=size, entry=entry, witness=witness, quantity=charge)
+
+
+def _negative(matrix: Array) -> float:
+    """The least eigenvalue of M in units of its diagonal where it is negative, else 0; NaN where M has no value."""
+    _, scaled, allowed = unit_free(matrix)
+    least = float(symmetric_eigenvalues(scaled).min(initial=0.0)) if np.all(np.isfinite(scaled)) else np.nan
+    return min(least + allowed, 0.0)
 
 
 def _function(primitive: "Primitive") -> Callable[..., Any]:

@@ -38,7 +38,7 @@ DEFINED = 40
 """Trials in which a structure has to have a finite value once."""
 SHRINKS = 2000
 """Trials on the way to the simplest counterexample, at most."""
-IDENTITIES = ("isotropy", "symmetry", "energy", "conservation")
+ROUNDED = ("isotropy", "symmetry", "energy", "conservation", "definite")
 """Exceptions that may be rounding."""
 UNDEFINED = ("finite", "undefined", "no-value")
 """Exceptions that mean that the structure is undefined at a state."""
@@ -52,7 +52,7 @@ def failure(primitive: "Primitive", where: Trial) -> StructureError | None:
             if primitive.kind == "reversible":
                 require_by_units(primitive, where)
     except StructureError as error:
-        return beyond_rounding(primitive, where, error) if error.kind in IDENTITIES else error
+        return beyond_rounding(primitive, where, error) if error.kind in ROUNDED else error
     except (ArithmeticError, ValueError) as error:
         return StructureError(
             "finite", primitive.name, what="the structure", found=f"{type(error).__name__}: {error}",

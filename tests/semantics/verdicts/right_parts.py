@@ -10,6 +10,12 @@ from ephs import quantity as Q
 from ephs.operad import Quantity, Space
 from tests.semantics.verdicts.wrong_parts import CB, QP, TURN, X, conduct, drag, gyrator, hidden, large, some, stored
 
+RESTS = (
+    lambda x: np.log(1.0 + x**2) - x**2 / (1.0 + x**2), lambda x: np.cosh(x) - 1.0 - 0.5 * x**2,
+    lambda x: x**2 - np.sin(x) ** 2, lambda x: np.sqrt(1.0 + x**2) - 1.0,
+)  # fmt: skip
+"""None is negative, by their series and slopes."""
+
 
 def motor(source):
     """A constant gyrator between odd quantities, in a magnet's field; with the numbers as a product leaves them."""
@@ -157,6 +163,12 @@ def damper(source):
     return drag(d)
 
 
+def cancelling(source):
+    """Drag that is the rest of large terms, none of whose digits is right at low speeds."""
+    a, b = some(source), some(source)
+    return drag(source.choice(tuple(lambda p, s, rest=rest: a * rest(b * p) for rest in RESTS)))
+
+
 def valve(source):
     a = some(source)
     return drag(lambda p, s: a * (1.0 + np.tanh(p)), one_sided=True)
@@ -227,4 +239,4 @@ PROVED = (
     motor, circulator, lorentz, two_units, turned, lever, rolling, rotated_pair, several_states, warm, valve,
     conductor, friction_of_two, sheared, faint, small_store, large_beside_a_sine,
 )  # fmt: skip
-RIGHT = (*PROVED, skew_of_states, written_in_two_ways, convex, convex_hidden, damper, frozen)
+RIGHT = (*PROVED, skew_of_states, written_in_two_ways, convex, convex_hidden, damper, cancelling, frozen)

@@ -246,6 +246,12 @@ def negative_between_two_temperatures(source):
     return conduct(lambda a, b: -1.0 if abs(a / b - share) < 1e-4 else 1.0)
 
 
+def negative_by_a_percent(source):
+    """At low speeds only, where most digits cancel."""
+    a, b = some(source), some(source)
+    return drag(lambda p, s: a * (np.cosh(b * p) - 1.0 - 0.505 * (b * p) ** 2))
+
+
 def not_skew_in_a_window(source):
     middle = source.uniform(-20.0, 20.0)
 
@@ -350,7 +356,7 @@ BREAKS = {
     "changing": (remembers, draws, in_a_global),
     "definite": (
         negative_in_a_window, negative_in_a_recorded_window, negative_at_speeds, negative_between_two_temperatures,
-        negative_by_a_polynomial,
+        negative_by_a_polynomial, negative_by_a_percent,
     ),
     "cold": (cold_beyond, cold_of_extreme_numbers),
     "gradient": (gradient_off, gradient_off_hidden, gradient_off_along_a_direction, gradient_off_in_a_window),
