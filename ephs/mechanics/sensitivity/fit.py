@@ -16,7 +16,15 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, NEIGHBOUR, TINY
 from ephs.semantics.systems.system import System
-from ephs.solve.posing.errors import OptionError, count_of, nearest_of, no_model, number_of
+from ephs.solve.posing.errors import (
+    OptionError,
+    Outcome,
+    SimulationError,
+    count_of,
+    nearest_of,
+    no_model,
+    number_of,
+)
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.threads import in_one_thread
 
@@ -36,6 +44,9 @@ OPTIONS = ("method", "step", "rtol", "atol", "t0", "initial", "inputs", "referen
 POSITIVE = ("mass", "friction", "stiffness", "damping", "length", "capacity", "temperature", "conductance")
 """Numbers of a scene that are not negative unless bounds say so; so are the diagonal of an inertia, and what the
 components of a system take."""
+
+ELSEWHERE = (Outcome.INTERRUPTED, Outcome.MEMORY, Outcome.PYTHON)
+"""Ends of runs that other parameters do not mend."""
 
 
 @final
@@ -121,7 +132,7 @@ def fit(
         deviations are of other names, or no numbers, bounds of a wrong order, start values beyond them, or deviations
         not positive.
     SimulationError
-        A motion could not be computed.
+        The motion at the start values could not be computed; where others cannot, the search takes shorter ways.
     """
     from scipy.optimize import least_squares
 
@@ -159,8 +170,9 @@ def fit(
     first = FIRST * runs.gain * off / np.where(seen, seen, np.inf)
     x0 = np.where(x0, x0, np.sign(room) * np.fmin(first, 0.5 * np.abs(room)))
     jacobian_of: Any = runs.jacobian
+    runs.at(x0)  # whose motion there has to be
     found = least_squares(
-        runs.residual, x0, jac=jacobian_of, bounds=(lower / scale, upper / scale), x_scale="jac",
+        runs.tried, x0, jac=jacobian_of, bounds=(lower / scale, upper / scale), x_scale="jac",
         xtol=XTOL, ftol=FTOL, gtol=GTOL, max_nfev=evaluations,
     )  # fmt: skip
     values = dict(zip(parameters, (found.x * scale).tolist(), strict=True))
@@ -271,6 +283,15 @@ class _FitRuns:
     def residual(self, x: Array) -> Array:
         """Computed less recorded, weighted, times the gain."""
         return (self.record.vector(self.at(x).solution) - self.record.recorded) * self.gain
+
+    def tried(self, x: Array) -> Array:
+        """The same, NaN where there is no motion, for which SciPy goes a shorter way."""
+        try:
+            return self.residual(x)
+        except SimulationError as error:
+            if error.outcome in ELSEWHERE:
+                raise
+            return np.full(self.record.size, np.nan)
 
     def jacobian(self, x: Array) -> Array:
         """Its derivative by the scaled parameters, zero where it is rounding."""

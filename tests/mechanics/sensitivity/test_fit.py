@@ -1,6 +1,8 @@
 """What a motion was computed with is found again in its record; with noise, within what the errors say."""
 
+from contextlib import nullcontext
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -8,12 +10,14 @@ import pytest
 import ephs
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.solve.equations.model import Evaluation
+from ephs.solve.posing.errors import Outcome, SimulationError
 from tests.numerics import largest
 from tests.oscillator import damped_oscillator
 from tests.scenes import shipped
 
 FOUR_BAR = ("joints.pivot.friction", "bodies.rocker.inertia[2]", "joints.main.friction")
 DOUBLE = ("joints.j0.friction", "joints.j1.friction", "bodies.rod1.inertia[1]", "bodies.rod1.mass")
+search = import_module("ephs.mechanics.sensitivity.fit")
 STEPS = {"method": "rk87", "step": 0.025}
 
 
@@ -142,6 +146,27 @@ def test_a_longer_record_builds_no_more_equations(monkeypatch):
         return len(built)
 
     assert count(5) == count(40) > 0
+
+
+@pytest.mark.parametrize(
+    ("failed", "outcome"), [(2, Outcome.DIVERGED), (2, Outcome.PYTHON), (1, Outcome.DIVERGED)], ids=str
+)
+def test_where_there_is_no_motion_a_fit_goes_a_shorter_way(monkeypatch, failed, outcome):
+    """Unless it is the first run that fails, or a function of the user."""
+    run = {"step": 0.05, "initial": {"osc.pe.q": 1.0}}
+    truth = ephs.simulate(damped_oscillator(), 1.0, **run)
+    data, runs, of = {"t": truth.t, "osc.pe.q": truth["osc.pe.q"]}, [], search.sensitivity
+
+    def failing(*arguments, **options):
+        runs.append(arguments)
+        if len(runs) == failed:
+            raise SimulationError(outcome, 1.0, "osc", "", None)
+        return of(*arguments, **options)
+
+    monkeypatch.setattr(search, "sensitivity", failing)
+    with nullcontext() if (failed, outcome) == (2, Outcome.DIVERGED) else pytest.raises(SimulationError):
+        found = ephs.fit(damped_oscillator(), data, ["mf.d"], start={"mf.d": 0.3}, **run)
+        assert found.converged and found.values["mf.d"] == pytest.approx(0.1, rel=1e-9)
 
 
 def test_a_number_alone_that_no_reading_shows_has_no_error_bound():
