@@ -367,7 +367,8 @@ def _outputs(eq: ReducedEquations, values: Array) -> list[ImageNumber]:
             add_outputs(eq.reduced.coordinates + int(t.r_at[i]), path, counted("rate", edge.pair.dim))
     first = eq.reduced.coordinates + eq.n
     for i in range(eq.reduced.links):
-        add_outputs(first + 7 * i, eq.reduced.places[i].path, POSE)
+        edge = eq.reduced.joints[i]  # which carries the link: a cross is no body
+        add_outputs(first + 7 * i, eq.reduced.places[i].path or f"{edge.path or edge.name}.link", POSE)
     names[-1] = "energy"
     return [
         ImageNumber(name, "J" if name == "energy" else "m" if ".position." in name else "", k, float(values[k]))

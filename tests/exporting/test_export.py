@@ -60,7 +60,7 @@ def advanced(model, until, **given):
 def assert_named(outputs, solution, within):
     """All outputs are what their names say; rotations up to the sign of their quaternions."""
     for name, value in outputs.items():
-        if name.split(".")[0] not in ("bodies", "joints"):
+        if name.split(".")[0] not in ("bodies", "joints") or ".link." in name:
             continue
         expected = wanted(solution, name)
         if ".quaternion." in name:
@@ -83,6 +83,12 @@ def test_outputs_are_at_the_start_what_their_names_say(seed):
     assert_named(outputs, solution, 1e-12)
     with pytest.raises(AssertionError):  # the control
         assert_named(outputs, ephs.simulate(model, 0.1, audit="off"), 1e-12)
+
+
+def test_links_that_are_no_body_have_the_name_of_the_joint_that_carries_them():
+    found = [each.name for each in image_of(shipped("universal")).outputs]
+    assert len(set(found)) == len(found) and "joints.cross.first.link.position.x" in found
+    assert {name.split(".")[0] for name in found} == {"bodies", "joints", "energy"}
 
 
 PUSHED = """
