@@ -5,6 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ephs
+from ephs.mechanics.elements.strain import displacement, stretching
+from ephs.semantics.spaces import SE3
 from tests.numerics import jacobian, largest
 from tests.written import scene_of_text
 
@@ -12,6 +14,8 @@ ELEMENTS, LENGTH, MASS, EA, CAPACITY, CONDUCTION, EXPANSION = 4, 1.0, 0.1, 1000.
 WARM, REFERENCE = 320.0, 300.0
 PULL = EA * EXPANSION
 CELL = LENGTH / ELEMENTS
+SHORT = 1e-5
+"""Step of central differences, whose rounding is about 1e-11 and whose curvature 1e-10."""
 ROD = """
 format = 1
 [world]
@@ -161,6 +165,20 @@ def test_both_laws_hold_where_it_bends_far(method, options):
     assert tip[2] < -0.2
     assert sol.energy_error.max() < 1e-11
     assert sol.stats["least_production"] >= -1e-18
+
+
+def test_the_rate_of_lengthening_is_the_slope_of_the_strain():
+    """At drawn poses, of elements that are curved and twisted without stress, along drawn twists."""
+    source = np.random.default_rng(7)
+    for _ in range(20):
+        length, rest, pose, u = source.uniform(0.1, 2.0), *(0.5 * source.standard_normal((3, 6)))
+        pose = SE3.exp(pose)
+
+        def lengthened(t, pose=pose, u=u, length=length, rest=rest):
+            return displacement(SE3.compose(pose, SE3.exp(t * u)), length, rest)[3]
+
+        slope = (lengthened(SHORT) - lengthened(-SHORT)) / (2.0 * SHORT)
+        assert np.dot(stretching(pose, length, rest), u) == pytest.approx(slope, abs=SHORT**1.5)
 
 
 def test_explicit_and_implicit_steps_meet():
