@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.motion.batch import compose, included, inverse
+from ephs.mechanics.motion.batch import adjoint_inverse, compose, included, inverse
 from ephs.mechanics.motion.gaps import Opening, largest_opening, relative_openings
 from ephs.mechanics.motion.leaps import leaps
 from ephs.mechanics.motion.motion import BodyMotion, JointMotion
@@ -23,7 +23,6 @@ from ephs.mechanics.tree.finding.tendons import length_errors
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
-from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.posing.errors import nearest_of
 from ephs.solve.result.labels import Labels, freedoms
 
@@ -154,7 +153,8 @@ class LinkMotion:
             residual = -rates[name] @ joint.pair.basis.T
             for end, frame, sign in zip(ends, frames, (-1.0, 1.0), strict=True):
                 if end.link != SOLID:
-                    residual = residual + sign * _at_frame(twists[names[end.link]], frame)
+                    seen = adjoint_inverse(np.broadcast_to(frame, inside.shape))
+                    residual = residual + sign * np.einsum("nij,nj->ni", seen, twists[names[end.link]])
             worst = np.maximum(worst, np.abs(residual).max(axis=1))
         return worst
 
@@ -210,13 +210,6 @@ class LinkMotion:
     @cached_property
     def _found(self) -> ByPath:
         return motion_of(self._solution)
-
-
-def _at_frame(twist: Array, frame: Array) -> Array:
-    """Twists (n, 6) of a body, seen from frames (7,) or (n, 7) in it."""
-    turn = np.array([quaternion_to_matrix(q) for q in np.broadcast_to(frame, (len(twist), 7))[:, :4]])
-    moved = twist[:, 3:] + np.cross(twist[:, :3], np.broadcast_to(frame, (len(twist), 7))[:, 4:])
-    return np.hstack([np.einsum("nji,nj->ni", turn, part) for part in (twist[:, :3], moved)])
 
 
 def _drawn(name: str, joint: LinkJoint, ends: list[tuple[str | None, Array]], element: Array) -> Joint:
