@@ -261,6 +261,7 @@ def test_a_sphere_slides_until_it_rolls():
     sol = run(scene, 1.5 * until, save_at=[0.5 * until, 1.5 * until])
     assert sol.body("ball").velocity[0, 0] == pytest.approx(v0 - 0.5 * mu * g * until, abs=10.0 * slip)
     assert sol.body("ball").velocity[-1, 0] == pytest.approx(5.0 / 7.0 * v0, abs=10.0 * slip)
+    assert sol.body("ball").angular_velocity[-1, 1] == pytest.approx(50.0 / 7.0 * v0, abs=100.0 * slip)
     assert sol.heat[-1] == pytest.approx(m * v0**2 / 7.0, abs=10.0 * slip)
 
 

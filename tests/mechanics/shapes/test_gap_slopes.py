@@ -79,10 +79,11 @@ def drawn(rng, slender):
 
 @pytest.mark.parametrize("name", ROUND)
 @given(seed=seeds)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_slopes_of_round_shapes_are_wrenches(name, seed):
     rng, gap = np.random.default_rng(seed), ROUND[name]
-    pose = np.concatenate([tilted(rng, 10.0 ** rng.uniform(-8, 0.5)), rng.normal(size=3)])
+    place = rng.choice([1.0, 0.1]) * rng.normal(size=3)  # a centre within a box, too
+    pose = np.concatenate([tilted(rng, 10.0 ** rng.uniform(-8, 0.5)), place])
     assert largest(slope(gap, pose) - wrench(gap, pose)) <= ROUNDING * (1.0 + np.abs(pose).sum())
 
 
@@ -99,6 +100,8 @@ def touched(rng, feature, body, *, first):
 
 
 NEARLY = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]])
+NEAR = 1e-8
+"""Of two surfaces that touch, in m: half of 5 m, thirty times."""
 FOUND = {
     "rim on a cap": (rim(0.3, 0.03), cylinder(0.25, 0.2, 0.02, 0.05), 0.25),
     "edge on a cylinder": (segment(0.4, 0.03), cylinder(0.25, 0.2, 0.02), 0.4),
@@ -123,6 +126,39 @@ def test_slopes_of_features_are_along_wrenches(name, first, rng):
     size = found @ expected / (expected @ expected)
     assert largest(found - size * expected) <= LEANING / UPRIGHT
     assert abs(size - 1.0) <= UPRIGHT * length / (feature.radius + body.radius) + LEANING
+
+
+def seen(gap, pose):
+    """Normal and contact point in the axes of C1."""
+    turn = quaternion_to_matrix(pose[:4])
+    normal, at = (turn @ np.array(part) for part in gap.contact(pose))
+    return normal, at + pose[4:]
+
+
+def assert_half_way(gap, back, pose, within):
+    """Of one pair of surfaces, named in both orders, the point is one and the normals are opposite."""
+    (normal, at), (opposite, same) = seen(gap, pose), (np.array(part) for part in back.contact(SE3.inverse(pose)))
+    assert largest(at - same) <= within
+    assert largest(normal + opposite) <= within / max(gap.radius, back.radius)
+
+
+@given(rng=generators)
+@settings(max_examples=25, deadline=None)
+def test_contact_points_are_half_way_between_the_surfaces(rng):
+    """Slopes do not tell: a force has the same moments wherever on its line it acts; friction has not."""
+    pose = np.concatenate([tilted(rng, 1.0), rng.normal(size=3)])
+    for gap, within in ((plane_sphere(0.1), ROUNDING), (plane_rim(0.2), 2.0 * UPRIGHT * 0.2)):
+        assert seen(gap, pose)[1][2] == pytest.approx(0.5 * gap.distance(pose), abs=within)
+    for box, rounding, radius in (((0.2, 0.1, 0.3), 0.05, 0.1), ((0.2, 0.0, 0.3), 0.05, 0.1)):
+        gap, back = rounded_box_sphere(box, rounding, radius), sphere_rounded_box(radius, box, rounding)
+        assert_half_way(gap, back, pose, ROUNDING * (1.0 + np.abs(pose).sum()))
+    for feature, body, length in FOUND.values():
+        gap, touching = touched(rng, feature, body, first=True)
+        assert_half_way(gap, meeting(feature, body, first=False), touching, ROUNDING)
+        assert body.distance(gap.contact(touching)[1]) == pytest.approx(body.radius, abs=UPRIGHT * length + NEAR)
+    sizes, near = drawn(rng, 3.0)
+    turned = np.concatenate([tilted(rng, 1.0), near[4:]])
+    assert_half_way(edges(*sizes), edges(*sizes[2:], *sizes[:2]), turned, ROUNDING)
 
 
 def errors(sizes, pose, length, parallel, passes):
