@@ -6,6 +6,7 @@ import pytest
 import ephs
 from ephs.mechanics.elements.joints import joint
 from ephs.mechanics.shapes.impact import Impact
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.semantics.bundles.errors import StructureError
 from tests.mechanics.impacts.test_hard_contact import G, run
 from tests.written import scene_of_text
@@ -130,6 +131,21 @@ def test_a_joint_in_python_takes_hard_stops():
     assert made != joint("revolute", limits=[-1.0, 1.0], stop=Impact(0.6))
     with pytest.raises(StructureError, match="limits of a joint with 3 degrees of freedom"):
         joint("spherical", limits=[-1.0, 1.0], stop=Impact(0.5))
+
+
+@pytest.mark.parametrize(
+    ("law", "key", "values"),
+    [
+        (Impact, "restitution", (-0.1, 1.1, np.nan)), (Impact, "tangential", (-0.1, 1.1, np.nan)),
+        (Impact, "friction", (-0.1, np.inf, np.nan)), (ConstitutiveLaw, "stiffness", (0.0, -1.0, np.inf, np.nan)),
+        (ConstitutiveLaw, "exponent", (0.9, np.inf)), (ConstitutiveLaw, "slip", (0.0, -1.0, np.inf)),
+        *((ConstitutiveLaw, key, (-0.1, np.inf, np.nan)) for key in ("loss", "friction", "rolling", "spinning")),
+    ],
+)  # fmt: skip
+def test_numbers_that_laws_of_contact_cannot_have_are_refused(law, key, values):
+    for value in values:
+        with pytest.raises(StructureError, match=f"parameter {key} is"):
+            law(**({"stiffness": 1.0} if law is ConstitutiveLaw else {}) | {key: value})
 
 
 def test_joints_carry_what_hard_contacts_and_stops_press():
