@@ -10,6 +10,7 @@ import numpy as np
 from ephs.exporting.errors import ExportError
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
+from ephs.solve.posing.errors import SolveError
 
 NEAR = 0.25
 """Relative displacement of a parameter, of 1 where it is 0: above rounding and within ranges."""
@@ -68,6 +69,8 @@ def dependence(
             found = arrays(dict(zip(names, (first + shares * moves).tolist(), strict=True)))
         except StructureError as error:
             raise ExportError("structure", found=", ".join(names)) from error
+        except SolveError as error:
+            raise ExportError("start", found=", ".join(names), why=error.outcome.value) from error
         if [each.size for each in found] != sizes:
             raise ExportError("structure", found=", ".join(names))
         return np.concatenate([np.zeros(0), *(each.ravel() for each in found)])

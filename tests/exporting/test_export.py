@@ -304,6 +304,12 @@ at = [0.0, 0.0, 0.2]
         image_of(scene_of_text(HARD + frame), parameters=["bodies.frame.mass"])
 
 
+def test_a_velocity_that_joints_do_not_admit_is_refused_by_name():
+    model = shipped("slider-crank")
+    with pytest.raises(ephs.ExportError, match=r"bodies\.slider\.velocity\[1\]: .*contradicts the constraints"):
+        image_of(model, parameters=["bodies.slider.velocity[1]"])
+
+
 def test_hard_stops_are_refused_by_name():
     """And elastic ones are in the program: it stands where a run does."""
     with pytest.raises(ephs.ExportError, match=r"joints\.rail\..*: a hard contact or stop"):
