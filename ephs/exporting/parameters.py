@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -107,7 +107,7 @@ def dependence(
     return out
 
 
-def _short(value: float) -> float:
+def _short(value: np.floating[Any]) -> float:
     """The number of few digits that a coefficient is but for rounding: with 1 + 2e-16, a friction of 0 is negative."""
     near = float(f"{value:.12g}")
     return near if abs(value - near) <= ROUNDED * abs(value) else float(value)
