@@ -3,18 +3,21 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
 from ephs.exporting.errors import ExportError
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
+from ephs.solve.posing.errors import SolveError
 
 NEAR = 0.25
 """Relative displacement of a parameter, of 1 where it is 0: above rounding and within ranges."""
 EXACT = 1e-12
 """Largest error of a polynomial, relative to an array's largest number: rounding of some hundred operations."""
+ROUNDED = 1e-15
+"""Relative error of a coefficient that is rounding of a difference."""
 Key = tuple[int, ...]
 
 
@@ -68,6 +71,8 @@ def dependence(
             found = arrays(dict(zip(names, (first + shares * moves).tolist(), strict=True)))
         except StructureError as error:
             raise ExportError("structure", found=", ".join(names)) from error
+        except SolveError as error:
+            raise ExportError("start", found=", ".join(names), why=error.outcome.value) from error
         if [each.size for each in found] != sizes:
             raise ExportError("structure", found=", ".join(names))
         return np.concatenate([np.zeros(0), *(each.ravel() for each in found)])
@@ -96,10 +101,16 @@ def dependence(
         if fit is None:
             raise ExportError("polynomial", found=names[int(np.argmax(apart[1 : 1 + len(names), place]))])
         constant, terms, reciprocal = fit
-        own_terms = {key: float(value / np.prod(moves[list(key)])) for key, value in terms.items() if value}
+        own_terms = {key: _short(value / np.prod(moves[list(key)])) for key, value in terms.items() if value}
         if own_terms:
             out.append(ParameterPolynomial(int(of_array[place]), int(inside[place]), constant, own_terms, reciprocal))
     return out
+
+
+def _short(value: np.floating[Any]) -> float:
+    """The number of few digits that a coefficient is but for rounding: with 1 + 2e-16, a friction of 0 is negative."""
+    near = float(f"{value:.12g}")
+    return near if abs(value - near) <= ROUNDED * abs(value) else float(value)
 
 
 def _either(

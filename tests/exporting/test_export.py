@@ -232,6 +232,14 @@ def test_parameters_make_the_program_of_the_changed_model(values, near, step):
     assert abs(unchanged[name] - expected[name]) > 1e-3, "the control"
 
 
+def test_a_friction_may_become_0():
+    """Then the shaft of 150 rad/s keeps its rate; a coefficient of 1 + 2e-16 would make the friction negative."""
+    run = Run(exported(image_of(shipped("hot-brake"), parameters=["joints.axle.friction"], until=0.1), "made"))
+    run.call("parameters", None, np.zeros(1))
+    assert run.call("advance", ctypes.c_int64, 0.1) == 0
+    assert run.outputs()["joints.axle.rate"] == pytest.approx(150.0, rel=1e-12)
+
+
 def test_parameters_that_are_no_polynomial_are_refused():
     model = shipped("slider-crank")
     with pytest.raises(ephs.ExportError, match=r"joints\.wrist\.at"):
@@ -308,6 +316,12 @@ at = [0.0, 0.0, 0.2]
 """
     with pytest.raises(ephs.ExportError, match=r"bodies\.frame\.mass"):
         image_of(scene_of_text(HARD + frame), parameters=["bodies.frame.mass"])
+
+
+def test_a_velocity_that_joints_do_not_admit_is_refused_by_name():
+    model = shipped("slider-crank")
+    with pytest.raises(ephs.ExportError, match=r"bodies\.slider\.velocity\[1\]: .*contradicts the constraints"):
+        image_of(model, parameters=["bodies.slider.velocity[1]"])
 
 
 def test_hard_stops_are_refused_by_name():

@@ -143,8 +143,9 @@ def read_mjcf(root: Any, draft: Draft) -> None:
         _joints(model, b, names, threads, draft)
         shapes(model, b, names.bodies[b], source, draft)
     contacts(model, names, draft)
-    actuators(model, names, tendons(model, names, draft), draft)
-    loops(model, names, {thread.equality for thread in threads.values()}, draft)
+    ropes = tendons(model, names, draft)
+    loops(model, names, threads.values(), draft)
+    actuators(model, names, ropes, draft)  # not on joints that are held
     noted(model, names, draft)
     model.leave_unread()
 

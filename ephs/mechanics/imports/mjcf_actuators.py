@@ -81,7 +81,7 @@ def actuators(model: Compiled, names: MjcfNames, ropes: dict[int, str], draft: D
         )
         line: Line | None = None
         route: Route | None = None
-        if kind in (through.mjTRN_JOINT, through.mjTRN_JOINTINPARENT) and not np.any(gear[1:]):
+        if kind in (through.mjTRN_JOINT, through.mjTRN_JOINTINPARENT):
             if names.kinds[target] in ("revolute", "prismatic"):
                 line = Line((target,), (1.0,), float(model.qpos0[model.jnt_qposadr[target]]))
         elif kind == through.mjTRN_TENDON:
@@ -107,6 +107,8 @@ def actuators(model: Compiled, names: MjcfNames, ropes: dict[int, str], draft: D
         gain = float(model.actuator_gainprm[a, 0])
         clamped, reach = model.actuator_ctrllimited[a], model.actuator_ctrlrange[a].tolist()
         limits = reach if clamped and not disabled(model, "CLAMPCTRL") else None
+        if limits is not None and not limits[0] <= 0.0 <= limits[1]:
+            draft.leave("force without a control, since its range lacks 0, of", name)
         if route is not None:
             if target not in ropes:
                 ropes[target] = route.tendon(_named(model, target), names, draft)

@@ -46,6 +46,8 @@ _PLAIN = {
 _SWITCHES = {"range": "limited", "actfrcrange": "actfrclimited", "forcerange": "forcelimited",
              "ctrlrange": "ctrllimited", "actrange": "actlimited"}  # fmt: skip
 """Ranges, and what says whether they hold."""
+_IDLE = "ENERGY", "FWDINV", "INVDISCRETE", "SLEEP"
+"""Enabled flags without an effect on motion."""
 _WORDS = {"actfrcrange": "actuatorfrcrange", "actgravcomp": "actuatorgravcomp"}
 """Attributes that have other names in files."""
 SOFT_STOPS = ("solref_limit", "solimp_limit", "margin")
@@ -165,7 +167,9 @@ def disabled(model: Any, *flags: str) -> bool:
 
 def _given(element: Any, plain: Any, kind: str) -> tuple[str, ...]:
     """Attributes of an element that may have an effect and differ from their defaults."""
-    off = import_module("mujoco").mjtLimited.mjLIMITED_FALSE
+    mujoco: Any = import_module("mujoco")
+    off = mujoco.mjtLimited.mjLIMITED_FALSE
+    idle = sum(int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}")) for flag in _IDLE)
     passed = {*_PLAIN[kind].split(), *_BOOKS.split(), *_SWITCHES.values()}
     found: list[str] = []
     for key in dir(element):
@@ -173,6 +177,10 @@ def _given(element: Any, plain: Any, kind: str) -> tuple[str, ...]:
         if not isinstance(value, (bool, int, float, str, np.ndarray)) and type(value).__module__ != _ENUMS:
             continue
         switch, value, default = _SWITCHES.get(key), np.array(value), np.array(getattr(plain, key))
+        if key == "enableflags":
+            value &= ~idle
+        if key == "wind" and not (element.density or element.viscosity):
+            value[:] = 0.0
         if kind == "equalities" and key == "data":
             if value[TORQUE_SCALE] != default[TORQUE_SCALE]:
                 found.append("torquescale")

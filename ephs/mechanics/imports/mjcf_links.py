@@ -1,6 +1,6 @@
 """Equality constraints of a compiled MJCF: lower pairs close loops, others lock joints or couple two."""
 
-from collections.abc import Set
+from collections.abc import Collection
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, final
@@ -50,7 +50,7 @@ def screws(model: Any, names: MjcfNames) -> dict[int, Thread]:
     return found
 
 
-def loops(model: Any, names: MjcfNames, screwed: Set[int], draft: Draft) -> None:
+def loops(model: Any, names: MjcfNames, threads: Collection[Thread], draft: Draft) -> None:
     """A spherical joint for a ``connect``, a fixed one for a ``weld``; a joint that is held at a value gets the rate 0,
     one that follows another in a constant ratio a gear.
 
@@ -58,9 +58,11 @@ def loops(model: Any, names: MjcfNames, screwed: Set[int], draft: Draft) -> None
     """
     mujoco: Any = import_module("mujoco")
     kinds, sites = mujoco.mjtEq, mujoco.mjtObj.mjOBJ_SITE
+    screwed, merged = {thread.equality for thread in threads}, {thread.slide for thread in threads}
     for e in range(model.neq):
         kind, data = int(model.eq_type[e]), np.array(model.eq_data[e])
         first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+        lone = kind == kinds.mjEQ_JOINT and not merged & {first, second}
         name = model.raw.equality(e).name or f"equality_{e + 1}"
         model.name("equalities", e, name)
         model.pass_by("equalities", e, "solref", "solimp")  # softness, which is noted
@@ -83,10 +85,10 @@ def loops(model: Any, names: MjcfNames, screwed: Set[int], draft: Draft) -> None
             (b1, at1), (b2, at2) = ends
             draft.joint(name, pair, names.bodies[b1], names.bodies[b2], at1, at2, {})
             draft.leave("softness of equality constraints", name)
-        elif kind == kinds.mjEQ_JOINT and second < 0 and not data[0]:
+        elif lone and second < 0 and not data[0]:
             draft.hold(names.joints[first])
             draft.leave("softness of equality constraints", name)
-        elif kind == kinds.mjEQ_JOINT and second >= 0 and _in_ratio(names, (first, second), data):
+        elif lone and second >= 0 and _in_ratio(names, (first, second), data):
             draft.gear(name, names.joints[first], names.joints[second], data[1])
             draft.leave("softness of equality constraints", name)
         else:

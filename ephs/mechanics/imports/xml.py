@@ -72,7 +72,7 @@ def numbers(text: str | None, count: int, key: str, faults: list[Fault], default
         faults.append(fault("value", key, "nothing", what=_counted(count)))
         return [0.0] * count
     try:
-        found = [float(word) for word in text.split()]
+        found = [_number(word) for word in text.split()]
     except ValueError:
         found = []
     if len(found) != count or not all(map(math.isfinite, found)):
@@ -88,7 +88,7 @@ def numbers(text: str | None, count: int, key: str, faults: list[Fault], default
 def bound(text: str | None, key: str, faults: list[Fault], default: float) -> float:
     """A limit: a number, infinite from `UNLIMITED` on; the default where there is none."""
     try:
-        found = float(text) if text and text.strip() else default
+        found = _number(text) if text and text.strip() else default
     except ValueError:
         found = math.nan
     if math.isnan(found):
@@ -101,6 +101,11 @@ def vector(
 ) -> list[float]:
     """Three numbers in an attribute of an element, which may be missing."""
     return numbers(None if element is None else element.get(name), 3, f"{key}.{name}", faults, default)
+
+
+def _number(word: str) -> float:
+    """A number; none where only Python's own parser takes it: ``1_0``, and digits of other scripts."""
+    return math.nan if "_" in word or not word.isascii() else float(word)
 
 
 def _counted(count: int) -> str:

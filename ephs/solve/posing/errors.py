@@ -276,5 +276,6 @@ def failing_at(t: float) -> Generator[None, None, None]:
     """A failure inside the solver at a time t in s as an error for users, without a partial solution."""
     try:
         yield
-    except SolveError as error:
+    except (SolveError, ArithmeticError, np.linalg.LinAlgError) as raised:
+        error = solve_error_of(raised)
         raise SimulationError(error.outcome, t, error.path, error.equation, None) from error.cause

@@ -200,6 +200,18 @@ def test_what_no_mass_determines_is_named():
         model.acceleration(model.state0)
 
 
+def test_a_singular_mass_is_an_error_of_ours():
+    slide = 'type = "prismatic"\nat = [0.0, 0.0, 0.0]\naxis = [0.0, -1.0, 0.0]\n'
+    text = (
+        "format = 1\n[bodies.a]\nmass = 0.0\ninertia = [0.0, 0.0, 0.0]\n"
+        "[bodies.b]\nmass = 0.3\ninertia = [1.0, 1.0, 1.0]\n"
+        f'[joints.x]\nbodies = ["ground", "a"]\n{slide}[joints.y]\nbodies = ["a", "b"]\n{slide}'
+        '[gears.belt]\njoints = ["x", "y"]\nratio = -2.0\nstiffness = 2.0\n'
+    )
+    with pytest.raises(ephs.SimulationError, match="singular"):
+        ephs.dynamics(scene_of_text(text)).state({"x": 0.3})
+
+
 HARD = """format = 1
 [bodies.ball]
 mass = 1.0

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import ephs
-from tests.mechanics.imports.models import MODELS, URDF
+from tests.mechanics.imports.models import MODELS, SDF, URDF
 from tests.refused import corpus
 from tests.typed import typed
 
@@ -56,6 +56,9 @@ def test_what_is_wrong_is_said_in_these_lines(ending, text, told, write, capsys)
     [
         ("sdf", "", "line 1, column 1: .*well-formed XML"),
         ("urdf", "<robot>" + "<a>" * 1000 + "</a>" * 1000 + "</robot>", "200 levels"),
+        ("urdf", URDF.replace('damping="0.3"', 'damping="1_0"'), r'dynamics\.damping: found "1_0".*finite number'),
+        ("urdf", URDF.replace('lower="-1"', 'lower="-١"'), r'limit\.lower: found "-١".*finite number'),
+        ("sdf", SDF.replace("<mass>0.2<", "<mass>2_0<"), r'inertial\.mass: found "2_0".*finite number'),
         ("xml", mjcf("<bodi/>"), "MuJoCo says.*unrecognized element"),
         ("xml", mjcf('<body name="a"><joint/></body>'), "MuJoCo says.*mass and inertia"),
         ("xml", mjcf('<body name="a"/><body name="a"/>'), "MuJoCo says.*repeated name"),

@@ -107,7 +107,7 @@ WELDED = """<mujoco><worldbody>
   <weld name="glue" body1="a" body2="b" anchor="0.2 0.1 0.3"/><joint name="stop" joint1="lock"/>
   <joint name="couple" joint1="lock" joint2="slow" polycoef="0 1 0.5 0 0"/>
   <connect name="idle" body1="a" body2="b" anchor="0 0 0" active="false"/>
-</equality></mujoco>"""
+</equality><actuator><position name="servo" joint="lock" kp="3"/></actuator></mujoco>"""
 
 
 def test_equalities_that_are_lower_pairs_hold(write):
@@ -116,6 +116,7 @@ def test_equalities_that_are_lower_pairs_hold(write):
     text = str(caught[0].message)
     assert "equality constraints that are neither lower pairs nor constant ratios: couple" in text
     assert "inactive equality constraints: idle" in text
+    assert "not modelled: actuators: servo" in text
     assert "softness of equality constraints: glue, stop" in text
     assert scene.joints["glue"].kind == "fixed"
     assert scene.joints["lock"].motion == ephs.PolynomialMotion((0.0,))
@@ -171,6 +172,13 @@ def test_a_hinge_and_a_slide_in_a_ratio_are_a_screw(order, first, second, ratio,
     dynamics = ephs.dynamics(scene)
     expected = -sign * 2.0 * 9.81 * 0.05 / (0.2 + 2.0 * 0.3**2 + 2.0 * 0.05**2)
     assert abs(dynamics.acceleration(dynamics.state0)["turn"][0] - expected) < 1e-12
+
+
+def test_what_else_holds_the_slide_of_a_screw_is_named(write):
+    text = SCREW.format(joints=TURN + '<joint name="rise" type="slide"/>', first="rise", second="turn", ratio=0.05)
+    more = text.replace("</equality>", '<joint name="stop" joint1="rise"/></equality>')
+    with pytest.warns(ephs.ModelWarning, match="neither lower pairs nor constant ratios: stop"):
+        assert ephs.load(write(more, "xml")).joint("turn").kind == "screw"
 
 
 RATIO = """<mujoco><worldbody>

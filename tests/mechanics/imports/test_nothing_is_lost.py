@@ -190,7 +190,8 @@ def test_a_read_that_is_deleted_in_the_source_is_told(monkeypatch, tmp_path):
             assert len(after) > len(before), line
 
 
-WHOLE = """<mujoco><compiler autolimits="true" angle="radian"/><option gravity="0 0 -1"/><worldbody>
+WHOLE = """<mujoco><compiler autolimits="true" angle="radian"/><option gravity="0 0 -1" wind="1 0 0">
+<flag energy="enable" fwdinv="enable"/></option><worldbody>
 <geom name="floor" type="plane" size="1 1 1"/><body name="b" pos="0 0 3" quat="1 1 0 0">
 <inertial pos="1 0 0" quat="1 0 1 0" mass="2" diaginertia="1 2 2.5"/>
 <joint name="j" pos="0 0 1" axis="0 1 0" range="-1 1" frictionloss="0.1" damping="1" ref="0.5" stiffness="3"
