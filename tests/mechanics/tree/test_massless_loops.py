@@ -214,3 +214,62 @@ def test_tangents_of_massless_legs_are_the_limit_of_light_ones():
     assert largest(one - other) < 1e-5 * largest(one)
     with pytest.raises(ephs.OptionError, match="method is 'rk87'"):
         ephs.sensitivity(stewart(0.0), ["bodies.plat.mass"], 0.05, method="rk87")
+
+
+BETWEEN = """
+format = 1
+[world]
+gravity = [0.4, -1.0, 0.7]
+[bodies.frame]
+mass = 0.0
+inertia = [0.0, 0.0, 0.0]
+position = {at}
+[bodies.block]
+mass = 2.0
+inertia = [0.2, 0.3, 0.4]
+position = {place}
+[joints.outer]
+type = "{kind}"
+bodies = ["ground", "frame"]
+at = {at}
+axis = {axis}
+[joints.inner]
+type = "{kind}"
+bodies = ["frame", "block"]
+at = {at}
+axis = {other}
+"""
+"""A frame without mass between two joints in one place."""
+
+
+def between(kind, seed, tilt):
+    """With axes anywhere, so far from each other in rad; and the axes."""
+    source = np.random.default_rng(seed)
+    axis, aside = np.linalg.qr(source.normal(size=(3, 2)))[0].T
+    other = np.cos(tilt) * axis + np.sin(tilt) * aside
+    at, place = source.normal(size=(2, 3))
+    given = {"at": at, "place": place, "axis": axis, "other": other}
+    text = BETWEEN.format(kind=kind, **{key: value.tolist() for key, value in given.items()})
+    return scene_of_text(text), np.array([axis, aside])
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("kind", ["prismatic", "revolute", "cylindrical", "spherical"])
+def test_two_joints_with_one_axis_do_not_determine_what_is_between_them(kind, seed):
+    """However rounding turns out, which the sweeps may take for mass."""
+    scene, _ = between(kind, seed, 0.0)
+    for refused in (lambda: ephs.simulate(scene, 0.01), lambda: ephs.dynamics(scene)):
+        with pytest.raises(ephs.SimulationError, match="not determined"):
+            refused()
+
+
+@pytest.mark.parametrize("tilt", [1e-3, 0.1, 1.5])
+@pytest.mark.parametrize("seed", range(3))
+def test_two_slides_in_one_plane_fall_along_it(seed, tilt):
+    """The control: as far as rounding over the square of the angle."""
+    scene, plane = between("prismatic", seed, tilt)
+    dynamics = ephs.dynamics(scene)
+    found = dynamics.acceleration(dynamics.state0)
+    axis, other = plane[0], np.cos(tilt) * plane[0] + np.sin(tilt) * plane[1]
+    along = found["outer"][0] * axis + found["inner"][0] * other
+    assert largest(along - plane.T @ (plane @ [0.4, -1.0, 0.7])) <= 1e-14 / np.sin(tilt) ** 2

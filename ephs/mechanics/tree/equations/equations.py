@@ -375,8 +375,10 @@ class ReducedEquations:
         Raises
         ------
         SolveError
-            The initial states contradict the joints.
+            The initial states contradict the joints, or no mass determines the motion of a link without mass.
         """
+        if moving := [i for i in self.reduced.loose if self.reduced.tables.dim[i]]:
+            raise unmoved(self.reduced, int(self.reduced.tables.r_at[moving[0]]))
         q, r, s = self._paper.initial()
         state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(self.summed)))
         self.led.start(lambda: self.row(state).energies)

@@ -11,6 +11,7 @@ from ephs.mechanics.shapes.gap import HEIGHT, PLACE
 from ephs.mechanics.shapes.impact import Meeting
 from ephs.mechanics.tree.finding.attaching import Attaching, attaching_of, makers_of
 from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link, Unplaced
+from ephs.mechanics.tree.finding.loose import loose_links
 from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.parts import Parts, WrenchPort, determined_by, parts_of
 from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
@@ -63,6 +64,8 @@ class Reduced:
         The outer ports at which wrenches act on links.
     attaching
         What is attached.
+    loose
+        Links without mass that move while all others rest.
     """
 
     tables: MechanismTables
@@ -79,6 +82,7 @@ class Reduced:
     gravity: Array
     acting: tuple[WrenchPort, ...]
     attaching: Attaching
+    loose: tuple[int, ...]
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
     @property
@@ -181,7 +185,27 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
     return Reduced(
         mechanism, edges, spans, names, tuple(links), stored, made, _nodes(model, parts), unknowns,
         tuple(elements), tuple(twists), parts.gravity, acting, attaching,
+        tuple(place[link] for link in _loose(parts, edges[:count], mechanism, attaching, twists, frames, problem.length,
+                                             alone=not placed)),
     )  # fmt: skip
+
+
+def _loose(
+    parts: Parts, edges: Sequence[Edge], mechanism: MechanismTables, attaching: Attaching, twists: Sequence[Array],
+    frames: Sequence[Array], length: float, *, alone: bool,
+) -> list[int]:  # fmt: skip
+    """Links without mass whose motion no mass determines, where nothing else may."""
+    light = {i for i, link in enumerate(parts.links) if not np.any(link.inertia)}
+    light -= {body for edge in (*parts.spans, *parts.forces) for body in (edge.body1, edge.body2)}
+    if not light:
+        return []
+    known = {(edge, k) for tie in attaching.ties for edge, k, _ in tie.terms}
+    for i in range(len(parts.links)):
+        own = range(int(mechanism.dim[i]))
+        known |= {(i, k) for k in own if (at := int(mechanism.r_at[i]) + k) < len(mechanism.driven)
+                  and (mechanism.driven[at] or mechanism.armature[at] > 0.0)}  # fmt: skip
+    free = [np.delete(of, [k for edge, k in known if edge == i], axis=1) for i, of in enumerate(twists)]
+    return loose_links(edges, free, frames, light, length, alone=alone)
 
 
 def _nodes(model: Model, parts: Parts) -> Table[EntropyNode]:
