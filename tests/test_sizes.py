@@ -10,16 +10,16 @@ from tests.rooms import ROOT, SOURCES, size_of
 CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_700,
-    "ephs/exporting": 14_100,
-    "ephs/mechanics": 427_600,
+    "ephs/exporting": 14_200,
+    "ephs/mechanics": 428_700,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
-    "ephs/semantics": 196_600,
+    "ephs/semantics": 196_700,
     "ephs/show": 64_900,
     "ephs/solve": 129_300,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 552_700,
+    "tests": 554_900,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
