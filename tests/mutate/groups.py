@@ -86,6 +86,27 @@ GROUPS = {
             f"{MECHANICS}/test_redundancy.py",
         ),
     ),
+    "elements": Group(
+        (
+            "ephs/mechanics/elements/*.py",
+            "ephs/mechanics/elements/shell/*.py",
+            "ephs/mechanics/shapes/*.py",
+        ),
+        (
+            f"{MECHANICS}/elements",
+            f"{MECHANICS}/shapes",
+            f"{MECHANICS}/test_components.py",
+            f"{MECHANICS}/test_models.py",
+            f"{MECHANICS}/test_twins.py",
+        ),
+        (
+            "ephs/mechanics/elements/components.py",
+            "ephs/mechanics/elements/joints.py",
+            "ephs/mechanics/elements/offset.py",
+            "ephs/mechanics/elements/notation.py",
+        ),
+        pace=LONG,
+    ),
     "primitives": Group(
         (
             "ephs/semantics/primitives/primitives.py",
