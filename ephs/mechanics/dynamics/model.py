@@ -67,7 +67,7 @@ class Dynamics:
         self.loading = Loading(self._equations, self._links)
         self.placing, self._steps = Placing(self._equations), Steps(self.problem, self._equations, self.loading.hard)
         with failing_at(0.0):
-            self.state0 = self._state(self._equations.start(0.0))
+            self.state0 = self._state(self._equations.start(0.0, determined=False))
 
     def __repr__(self) -> str:
         cut = f", {', '.join(self.cut)} cut" if self.cut else ""

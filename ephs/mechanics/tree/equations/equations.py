@@ -137,6 +137,7 @@ class ReducedEquations:
 
     def accelerations(self, state: ReducedState) -> Array:
         """(n,) of the tree's degrees of freedom at a state."""
+        self.require_determined()
         return self.rates(state.t, state.q, self.vector(state))[self.nv : self.nv + self.n]
 
     def unheld(self, base: Array, y: Array) -> tuple[Array, Array]:
@@ -255,6 +256,7 @@ class ReducedEquations:
 
     def mass(self, q: Array, r: Array) -> Array:
         """(n, n) the mass matrix at q."""
+        self.require_determined()
         return self.dense.mass(q, r)
 
     def rows(self) -> Array:
@@ -369,16 +371,27 @@ class ReducedEquations:
         """All states of the system."""
         return JointStates(self._paper, self.layout, state.q, state.r, self.heats.entropies(state.heats))
 
-    def start(self, t: float) -> ReducedState:
-        """The state that the problem begins with, its loops closed.
+    def require_determined(self) -> None:
+        """Look for links without mass whose motion no mass determines, which rounding may hide from the sweeps.
+
+        Raises
+        ------
+        SolveError
+            There is one.
+        """
+        if moving := [i for i in self.reduced.loose if self.reduced.tables.dim[i]]:
+            raise unmoved(self.reduced, int(self.reduced.tables.r_at[moving[0]]))
+
+    def start(self, t: float, *, determined: bool = True) -> ReducedState:
+        """The state that the problem begins with, its loops closed; if it is to be moved from, ``determined``.
 
         Raises
         ------
         SolveError
             The initial states contradict the joints, or no mass determines the motion of a link without mass.
         """
-        if moving := [i for i in self.reduced.loose if self.reduced.tables.dim[i]]:
-            raise unmoved(self.reduced, int(self.reduced.tables.r_at[moving[0]]))
+        if determined:
+            self.require_determined()
         q, r, s = self._paper.initial()
         state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(self.summed)))
         self.led.start(lambda: self.row(state).energies)

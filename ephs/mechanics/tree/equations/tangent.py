@@ -34,6 +34,7 @@ class Linearised:
             A component cannot be evaluated there, or the mass matrix is singular.
         """
         eq = self.equations
+        eq.require_determined()
         eq.refuse(*self._dense.forward(q, r, s, eq.drive, eq.wrench))
         settled = self._dense.settle()
         return np.concatenate([self._dense.rate, settled[self._residual.cut_changes]])

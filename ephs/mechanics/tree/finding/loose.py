@@ -12,6 +12,7 @@ from ephs.mechanics.tree.finding.spanning import Edge
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import singular_values, svd
 from ephs.semantics.spaces.rank import ALIGNED
 
 
@@ -66,10 +67,10 @@ def _moves(
     seen = np.diag([1.0] * 3 + [1.0 / length] * 3) @ SE3.adjoint(about)
     rows = np.zeros((len(joints), 6, 6 * len(group)))
     for row, i in zip(rows, joints, strict=True):
-        basis, sizes, _ = np.linalg.svd(seen @ twists[i], full_matrices=False)
+        basis, sizes, _ = svd(seen @ twists[i], full_matrices=False)
         basis = basis[:, sizes > ALIGNED * sizes.max(initial=0.0)]
         for body, sign in ((edges[i].body1, -1.0), (edges[i].body2, 1.0)):
             if body in group:
                 at = 6 * group.index(body)
                 row[:, at : at + 6] += sign * (np.eye(6) - basis @ basis.T)
-    return bool(np.linalg.svd(rows.reshape(-1, 6 * len(group)), compute_uv=False)[-1] < ALIGNED)
+    return bool(singular_values(rows.reshape(-1, 6 * len(group)))[-1] < ALIGNED)
