@@ -39,6 +39,18 @@ def unmoved(reduced: Reduced, freedom: int) -> SolveError:
     return SolveError(Outcome.UNDETERMINED, str(reduced.path(link)), f"the rate of {name}, which moves no mass")
 
 
+def require_determined(reduced: Reduced) -> None:
+    """Look for links without mass whose motion no mass determines, which rounding may hide from the sweeps.
+
+    Raises
+    ------
+    SolveError
+        There is one.
+    """
+    if moving := [i for i in reduced.loose if reduced.tables.dim[i]]:
+        raise unmoved(reduced, int(reduced.tables.r_at[moving[0]]))
+
+
 @final
 class Dense:
     """Mass matrix, constraints orthogonalised in its metric, and derived matrices.
@@ -74,6 +86,7 @@ class Dense:
 
     def mass(self, q: Array, r: Array) -> Array:
         """(n, n) the mass matrix at q."""
+        require_determined(self.reduced)
         self._assemble(q, r)
         return self.residual.arrays["mass"].copy()
 

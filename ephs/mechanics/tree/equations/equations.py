@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.tree.engine.build import engine_of
 from ephs.mechanics.tree.equations.accounts import Accounts
 from ephs.mechanics.tree.equations.booking import Booking
-from ephs.mechanics.tree.equations.dense import Dense, unmoved
+from ephs.mechanics.tree.equations.dense import Dense, require_determined, unmoved
 from ephs.mechanics.tree.equations.given import Given
 from ephs.mechanics.tree.equations.heat import heats_of
 from ephs.mechanics.tree.equations.led import Led
@@ -137,7 +137,7 @@ class ReducedEquations:
 
     def accelerations(self, state: ReducedState) -> Array:
         """(n,) of the tree's degrees of freedom at a state."""
-        self.require_determined()
+        require_determined(self.reduced)
         return self.rates(state.t, state.q, self.vector(state))[self.nv : self.nv + self.n]
 
     def unheld(self, base: Array, y: Array) -> tuple[Array, Array]:
@@ -241,8 +241,6 @@ class ReducedEquations:
         r[self.driven] = wanted
         return replace(state, q=q, r=r, memory=())
 
-    # ---- the same over dense matrices --------------------------------------------------------------------------
-
     @property
     def dense(self) -> Dense:
         """Sweeps over dense matrices, made when they are first asked for."""
@@ -256,7 +254,6 @@ class ReducedEquations:
 
     def mass(self, q: Array, r: Array) -> Array:
         """(n, n) the mass matrix at q."""
-        self.require_determined()
         return self.dense.mass(q, r)
 
     def rows(self) -> Array:
@@ -371,17 +368,6 @@ class ReducedEquations:
         """All states of the system."""
         return JointStates(self._paper, self.layout, state.q, state.r, self.heats.entropies(state.heats))
 
-    def require_determined(self) -> None:
-        """Look for links without mass whose motion no mass determines, which rounding may hide from the sweeps.
-
-        Raises
-        ------
-        SolveError
-            There is one.
-        """
-        if moving := [i for i in self.reduced.loose if self.reduced.tables.dim[i]]:
-            raise unmoved(self.reduced, int(self.reduced.tables.r_at[moving[0]]))
-
     def start(self, t: float, *, determined: bool = True) -> ReducedState:
         """The state that the problem begins with, its loops closed; if it is to be moved from, ``determined``.
 
@@ -391,7 +377,7 @@ class ReducedEquations:
             The initial states contradict the joints, or no mass determines the motion of a link without mass.
         """
         if determined:
-            self.require_determined()
+            require_determined(self.reduced)
         q, r, s = self._paper.initial()
         state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(self.summed)))
         self.led.start(lambda: self.row(state).energies)

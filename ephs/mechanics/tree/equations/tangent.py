@@ -6,6 +6,7 @@ import numpy as np
 
 from ephs.mechanics.rewrite.coordinates import unread
 from ephs.mechanics.road.records import LinkPlace
+from ephs.mechanics.tree.equations.dense import require_determined
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.equations.sparse import Index
@@ -34,7 +35,7 @@ class Linearised:
             A component cannot be evaluated there, or the mass matrix is singular.
         """
         eq = self.equations
-        eq.require_determined()
+        require_determined(eq.reduced)
         eq.refuse(*self._dense.forward(q, r, s, eq.drive, eq.wrench))
         settled = self._dense.settle()
         return np.concatenate([self._dense.rate, settled[self._residual.cut_changes]])
