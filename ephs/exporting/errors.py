@@ -17,7 +17,7 @@ TEXTS: Final = {
     "tool": "{what} needs {tool}, which is not installed: pip install {package}",
     "refused": "{tool} refuses the program: {found}",
     "structure": "parameters {found}: they change the structure of the mechanism, expected numbers only",
-    "start": "parameters {found}: other values of them give {why}",
+    "start": "parameters {found}: other values of them give {why}; expected numbers that the joints leave free",
     "polynomial": "parameter {found}: the program's tables are not polynomials of degree 2 in it, expected one such as "
     "a mass, a stiffness, a friction or a force",
     "values": "numbers of shape {found}: expected {expected}, one for each parameter",

@@ -224,7 +224,7 @@ def unit_free(matrix: Array) -> tuple[Array, Array, float]:
     Returns
     -------
     weight, scaled, allowed
-        What rows and columns (n,) are multiplied by, the matrix (n, n), and what rounding may do to its entries.
+        Factors (n,) of rows and columns, the scaled matrix (n, n), and the bound of the rounding of its entries.
     """
     size = np.sqrt(np.abs(np.diag(matrix)))
     size = np.where(size > 0.0, size, np.sqrt(np.abs(matrix).max(axis=1, initial=0.0)))
